@@ -1,0 +1,1 @@
+"""The Blender side: everything that touches bpy, and nothing else."""

@@ -1,0 +1,1 @@
+"""Pictures in files, without Blender: the command line and the catalog."""

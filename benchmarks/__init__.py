@@ -1,0 +1,1 @@
+"""Studies that print tables and draw charts; each module is a command."""

@@ -1,0 +1,147 @@
+"""A picture as the core sees it: scene-linear RGB on demand, whatever the pixels are stored as."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import transfer
+from .errors import ImageError, MaskError
+
+# Pixels in one band: small enough for the cache, and its product with a 3x3 matrix stays under the size from
+# which OpenBLAS spreads one product over threads, which is many times slower when the cores are busy.
+BAND_PIXELS = 24_000
+
+
+class Picture:
+    """Pixels and the curve that linearizes them; nothing is decoded before it is asked for.
+
+    Parameters
+    ----------
+    pixels
+        (height, width, 3 or more), top row first: uint8 or uint16 codes, or floats. Channels after the third are
+        carried along by the front ends and not looked at here.
+    curve
+        The transfer curve of the pixels. Without one they must be floats, scene-linear.
+
+    Raises
+    ------
+    ImageError
+        If the array is not a picture, or holds integer codes and no curve is given.
+    """
+
+    def __init__(self, pixels: ArrayLike, curve: transfer.Curve | None = None) -> None:
+        array = np.asarray(pixels)
+        if array.ndim != 3 or array.shape[2] < 3:
+            raise ImageError(f"Picture has shape {array.shape}: give (height, width, 3), linear RGB.")
+        if 0 in array.shape:
+            raise ImageError(f"Picture of shape {array.shape} has no pixels: give one of at least 1 x 1.")
+        if array.dtype.kind not in "fu" or (array.dtype.kind == "u" and array.dtype.itemsize > 2):
+            raise ImageError(f"Picture has dtype {array.dtype}: give float32, linear RGB.")
+        if array.dtype.kind == "u" and curve is None:
+            raise ImageError(
+                f"Picture holds {array.dtype} codes: decode them to linear floats first "
+                "(dyehouse.core.transfer.decode)."
+            )
+        self.pixels = array
+        self.curve = curve or transfer.LINEAR
+
+    @classmethod
+    def of(cls, image: ArrayLike | Picture) -> Picture:
+        """Take a picture as it is, and an array as scene-linear floats."""
+        return image if isinstance(image, Picture) else cls(image)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width)."""
+        return self.pixels.shape[0], self.pixels.shape[1]
+
+    @property
+    def is_linear_float32(self) -> bool:
+        """Whether the stored pixels are what `linear` returns, so that no decoding is needed."""
+        return self.pixels.dtype == np.float32 and self.curve.is_linear and self.pixels.shape[2] == 3
+
+    def linear(self, rows: slice = slice(None), columns: slice = slice(None)) -> NDArray[np.float32]:
+        """(height, width, 3) float32 scene-linear RGB of a part; may be a view of the pixels, do not write to it."""
+        part = self.pixels[rows, columns, :3]
+        if part.dtype == np.float32 and self.curve.is_linear:
+            return part
+        return transfer.decode(part, self.curve)
+
+    def sample(self, most: int, mask: NDArray | None = None) -> NDArray[np.float32]:
+        """(n, 3) linear pixels on a regular grid, about `most` of them or all; with a mask, well inside it only."""
+        height, width = self.shape
+        if mask is None:
+            step = _step(height * width, most)
+            return self.linear(slice(step // 2, None, step), slice(step // 2, None, step)).reshape(-1, 3)
+        inside = as_weights(mask) > 0.95
+        step = _step(int(np.count_nonzero(inside)), most)
+        grid = inside[step // 2 :: step, step // 2 :: step]
+        if not grid.any():
+            return self.linear()[inside].reshape(-1, 3)
+        return self.linear(slice(step // 2, None, step), slice(step // 2, None, step))[grid]
+
+    @property
+    def clip_level(self) -> float:
+        """Linear value from which a channel counts as clipped; infinite for scene-linear floats without a top."""
+        if self.pixels.dtype.kind == "u":
+            return 1.0 - 1e-6
+        top = float(self.sample(1_000_000).max())
+        return 1.0 - 1e-6 if 1.0 - 1e-6 <= top <= 1.0 + 1e-6 else np.inf
+
+
+def _step(pixels: int, most: int) -> int:
+    return max(1, int(np.ceil(np.sqrt(pixels / most))))
+
+
+def bands(height: int, width: int, start: int = 0) -> Iterator[slice]:
+    """Row slices of about `BAND_PIXELS` pixels each, from row `start` to `start + height`."""
+    rows = max(1, BAND_PIXELS // max(1, width))
+    for top in range(start, start + height, rows):
+        yield slice(top, min(top + rows, start + height))
+
+
+def as_mask(mask: ArrayLike | None, shape: tuple[int, int]) -> NDArray | None:
+    """Check a mask against a picture.
+
+    Parameters
+    ----------
+    mask
+        (height, width): bool, uint8 or uint16 codes of coverage, or floats in 0..1; None for the whole picture.
+    shape
+        (height, width) of the picture.
+
+    Raises
+    ------
+    MaskError
+        If the size differs, a value is out of range, or nothing is selected.
+    """
+    if mask is None:
+        return None
+    m = np.asarray(mask)
+    if m.dtype == bool:
+        m = m.astype(np.uint8) * np.uint8(255)
+    if m.dtype.kind not in "fu":
+        raise MaskError(f"Mask has dtype {m.dtype}: give coverage as floats in 0..1, or bool.")
+    if m.shape != shape:
+        raise MaskError(
+            f"Mask is {_size(m.shape)} and the picture is {_size(shape)}: give a mask of the picture's size."
+        )
+    if m.dtype.kind == "f" and not (np.nanmin(m) >= -1e-6 and np.nanmax(m) <= 1 + 1e-6 and not np.isnan(m).any()):
+        raise MaskError("Mask has values outside 0..1: scale coverage so that 1 is fully selected.")
+    if not m.any():
+        raise MaskError("Mask selects nothing: every pixel of it is 0, so there is no product to recolor.")
+    return m
+
+
+def as_weights(mask: NDArray) -> NDArray[np.float32]:
+    """Coverage of a checked mask (or a part of one) as float32 in 0..1."""
+    if mask.dtype.kind == "u":
+        return mask.astype(np.float32) * np.float32(1 / np.iinfo(mask.dtype).max)
+    return mask.astype(np.float32, copy=False)
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return f"{shape[1]} x {shape[0]} pixels" if len(shape) == 2 else f"of shape {shape}"

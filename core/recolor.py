@@ -1,0 +1,241 @@
+"""The one path from pixels to recolored pixels, which every front end takes.
+
+Under the models of this package recoloring a region is a 3x3 matrix on linear light. The work is done in bands
+that fit the cache, on all cores, and only inside the region's bounding box.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from . import gamut, transfer
+from .compositing import Edge
+from .errors import ImageError
+from .picture import Picture, as_weights, bands
+
+
+@dataclass(frozen=True, eq=False)
+class RegionMatrix:
+    """What is done to one region.
+
+    Attributes
+    ----------
+    matrix
+        (3, 3) linear RGB to linear RGB.
+    mask
+        (height, width) checked coverage, or None for the whole picture.
+    edge
+        The product's share in pixels of soft coverage, or None for plain blending.
+    """
+
+    matrix: NDArray[np.float64]
+    mask: NDArray | None = None
+    edge: Edge | None = None
+
+    @cached_property
+    def box(self) -> tuple[slice, slice] | None:
+        """(rows, columns) that hold the region; None for the whole picture."""
+        if self.mask is None:
+            return None
+        rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))
+        if len(rows) == 0:
+            return slice(0, 0), slice(0, 0)
+        return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+@dataclass(frozen=True)
+class Shares:
+    """How much of the recolored regions the output could not hold.
+
+    Attributes
+    ----------
+    pixels
+        Number of pixels in the regions.
+    out_of_gamut
+        Share of them, 0..1, outside the output's range before they were brought in.
+    """
+
+    pixels: int
+    out_of_gamut: float
+
+
+def recolor(
+    picture: Picture,
+    regions: Sequence[RegionMatrix],
+    *,
+    curve: transfer.Curve | None = None,
+    dtype: DTypeLike = np.float32,
+    out: NDArray | None = None,
+    threads: int | None = None,
+) -> tuple[NDArray, Shares]:
+    """Apply the regions' matrices.
+
+    Parameters
+    ----------
+    picture
+        The photo.
+    regions
+        Where they overlap, a later one lies over an earlier one.
+    curve, dtype
+        Encoding of the result: uint8 or uint16 codes, or floats. Integer results are brought into gamut by
+        :func:`gamut.fit_to_gamut`; float results are left as they are, below 0 and above 1 too. Without a curve
+        the result is linear.
+    out
+        (height, width, 3 or more) array of `dtype` to write the first three channels of; may be the picture's own
+        pixels if those may be lost. None for a new (height, width, 3).
+    threads
+        None for one per core.
+
+    Returns
+    -------
+    out
+        The recolored picture.
+    shares
+        What was outside the output's range; always 0 for floats.
+
+    Raises
+    ------
+    ImageError
+        If the picture has NaN or infinite pixels.
+    """
+    dtype = np.dtype(dtype)
+    curve = curve or transfer.LINEAR
+    height, width = picture.shape
+    same_codes = dtype == picture.pixels.dtype and curve == picture.curve
+    if out is None:
+        out = np.empty((height, width, 3), dtype)
+    rows, columns = _bounds(regions, height, width)
+    whole = (rows.stop - rows.start, columns.stop - columns.start) == (height, width)
+    in_place = np.shares_memory(out, picture.pixels)
+    if same_codes and not whole and not in_place:
+        np.copyto(out[..., :3], picture.pixels[..., :3])
+    elif not same_codes:
+        rows, columns = slice(0, height), slice(0, width)  # everything must be encoded anew
+
+    job = _Job(picture, regions, columns, curve, dtype, out)
+    parts = list(bands(rows.stop - rows.start, max(1, columns.stop - columns.start), rows.start))
+    workers = min(threads or os.process_cpu_count() or 1, max(1, len(parts) // 4))
+    if workers == 1:
+        counts = [job.run(parts)]
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            counts = list(pool.map(job.run, [parts[k::workers] for k in range(workers)]))
+    pixels, outside = (sum(c) for c in zip(*counts, strict=True))
+    return out, Shares(int(pixels), float(outside / pixels) if pixels else 0.0)
+
+
+def _bounds(regions: Sequence[RegionMatrix], height: int, width: int) -> tuple[slice, slice]:
+    boxes = [r.box for r in regions]
+    if any(b is None for b in boxes):
+        return slice(0, height), slice(0, width)
+    known = [b for b in boxes if b is not None and b[0].stop > b[0].start]
+    if not known:
+        return slice(0, 0), slice(0, 0)
+    return (
+        slice(min(b[0].start for b in known), max(b[0].stop for b in known)),
+        slice(min(b[1].start for b in known), max(b[1].stop for b in known)),
+    )
+
+
+class _Job:
+    """One recolor: what the threads share."""
+
+    def __init__(
+        self,
+        picture: Picture,
+        regions: Sequence[RegionMatrix],
+        columns: slice,
+        curve: transfer.Curve,
+        dtype: np.dtype,
+        out: NDArray,
+    ) -> None:
+        self.picture, self.regions, self.columns, self.out = picture, regions, columns, out
+        self.curve, self.dtype = curve, dtype
+        self.integer = dtype.kind == "u"
+        # A pixel times the transposed matrix, so that (n, 3) rows need no turning round.
+        self.matrices = [np.ascontiguousarray(r.matrix.T, np.float32) for r in regions]
+        self.changes = [np.ascontiguousarray((r.matrix - np.eye(3)).T, np.float32) for r in regions]
+
+    def run(self, parts: list[slice]) -> tuple[int, int]:
+        """Recolor these bands; returns (pixels in regions, pixels out of gamut)."""
+        inside = outside = 0
+        if not parts:
+            return 0, 0
+        width = self.columns.stop - self.columns.start
+        size = max(p.stop - p.start for p in parts) * width
+        scratch = np.empty((size, 3), np.float32)
+        product = np.empty((size, 3), np.float32)
+        decoder = transfer.Decoder(self.picture.curve, self.picture.pixels.dtype)
+        encoder = transfer.Encoder(self.curve, self.dtype)
+        for rows in parts:
+            n = (rows.stop - rows.start) * width
+            stored = self.picture.pixels[rows, self.columns, :3].reshape(n, 3)
+            linear = decoder.into(stored, scratch[:n])
+            result, covered = self._apply(rows, linear, product[:n])
+            if covered == 0 and result is linear and self.dtype == stored.dtype and self.curve == self.picture.curve:
+                self.out[rows, self.columns, :3] = stored.reshape(rows.stop - rows.start, width, 3)
+                continue
+            inside += covered
+            if result is linear:  # perhaps the picture's own memory, and what follows overwrites
+                result = product[:n]
+                np.copyto(result, linear)
+            if not np.isfinite(np.vdot(result, result)):
+                _check_finite(result)
+            if self.integer:
+                outside += gamut.fit_to_gamut(result)
+            encoder.into(result, self.out[rows, self.columns, :3])
+        return inside, outside
+
+    def _apply(
+        self, rows: slice, linear: NDArray[np.float32], product: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], int]:
+        """Recolor one band; returns (pixels, number inside regions). The result may be `linear` or `product`."""
+        if len(self.regions) == 1:
+            region = self.regions[0]
+            weights = self._weights(region, rows)
+            if weights is None:
+                return np.matmul(linear, self.matrices[0], out=product), len(linear)
+            low, high = float(weights.min()), float(weights.max())
+            if high == 0:
+                return linear, 0
+            if low == 1:
+                return np.matmul(linear, self.matrices[0], out=product), len(linear)
+        result = product
+        np.copyto(result, linear)
+        room: NDArray | float = 1.0
+        covered: NDArray | None = None
+        for k in reversed(range(len(self.regions))):
+            region = self.regions[k]
+            asked = self._weights(region, rows)
+            weights = np.ones(len(linear), np.float32) if asked is None else asked
+            granted = np.minimum(weights, room)
+            room = room - granted
+            change = linear @ self.changes[k]
+            change *= granted[:, None]
+            if region.edge is not None:
+                part = region.edge.within(rows)
+                width = self.columns.stop - self.columns.start
+                at = (region.edge.rows[part] - rows.start) * width + region.edge.columns[part] - self.columns.start
+                scale = granted[at] / np.maximum(weights[at], 1e-6)
+                change[at] = (region.edge.share[part] @ self.changes[k]) * scale[:, None]
+            result += change
+            covered = granted > 0 if covered is None else covered | (granted > 0)
+        return result, int(np.count_nonzero(covered))
+
+    def _weights(self, region: RegionMatrix, rows: slice) -> NDArray[np.float32] | None:
+        if region.mask is None:
+            return None
+        return as_weights(region.mask[rows, self.columns]).reshape(-1)
+
+
+def _check_finite(pixels: NDArray) -> None:
+    bad = int(np.count_nonzero(~np.isfinite(pixels).all(axis=-1)))
+    if bad:  # the sum of squares of huge ordinary numbers may overflow without one
+        raise ImageError("Picture has NaN or infinite pixels: repair or mask them before recoloring.")

@@ -1,0 +1,329 @@
+"""The two colors that everything hangs on: the product's matte body color, and the white of the light.
+
+A reference must be matte. If it holds gloss, B is below zero elsewhere on the product and the target, a flat
+measured color, is mistaken for a glossy one: 1 % of the white in the reference costs about one color difference
+unit over the whole product, while a white that is 3 % off costs 0.05 (trial renders).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dichromatic import sine
+from .errors import ReferenceColorError, WhiteError
+from .picture import Picture, as_weights
+
+# Linear luminance under which a pixel is too dark, relative to white, to tell its color from noise.
+DARK = 0.004
+
+# Pixels that a search looks at; more do not change the answer.
+_SAMPLE = 200_000
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A reference color and what was seen when it was taken.
+
+    Attributes
+    ----------
+    color
+        (3,) float64 linear RGB.
+    pixel
+        (x, y), or None if no pixel was given.
+    gloss
+        Surface reflection in it, as a share of the white; 0 if none was seen. Only measured for a pixel.
+    """
+
+    color: NDArray[np.float64]
+    pixel: tuple[int, int] | None = None
+    gloss: float = 0.0
+
+
+def check_pixel(picture: Picture, pixel: tuple[int, int], what: str) -> tuple[int, int]:
+    """(x, y) as whole numbers inside the picture.
+
+    Raises
+    ------
+    ReferenceColorError
+        If it lies outside.
+    """
+    x, y = int(pixel[0]), int(pixel[1])
+    height, width = picture.shape
+    if not (0 <= x < width and 0 <= y < height):
+        raise ReferenceColorError(
+            f"{what} ({x}, {y}) lies outside the picture of {width} x {height} pixels: x goes from 0 to "
+            f"{width - 1} and y from 0 to {height - 1}."
+        )
+    return x, y
+
+
+def window_radius(shape: tuple[int, int]) -> int:
+    """Radius of the small window that stands for a clicked pixel: 1 for small pictures, 6 for 24 megapixels."""
+    return int(np.clip(round(0.0015 * max(shape)), 1, 6))
+
+
+def read_window(picture: Picture, pixel: tuple[int, int], mask: NDArray | None = None) -> NDArray[np.float32]:
+    """(n, 3) linear pixels of the small window around (x, y), those of the mask only."""
+    x, y = pixel
+    radius = window_radius(picture.shape)
+    rows, columns = slice(max(0, y - radius), y + radius + 1), slice(max(0, x - radius), x + radius + 1)
+    window = picture.linear(rows, columns).reshape(-1, 3)
+    if mask is not None:
+        window = window[as_weights(mask[rows, columns]).reshape(-1) > 0.5]
+    return window
+
+
+def trimmed_mean(pixels: NDArray, keep: float = 0.6) -> NDArray[np.float64]:
+    """(3,) mean of the share of (n, 3) pixels that lie nearest to their median: blind to specks and edges."""
+    middle = np.median(pixels, axis=0)
+    distance = np.linalg.norm(pixels - middle, axis=1)
+    nearest = np.argsort(distance, kind="stable")[: max(1, round(keep * len(pixels)))]
+    return pixels[nearest].mean(axis=0, dtype=np.float64)
+
+
+def reference_at(picture: Picture, pixel: tuple[int, int], white: NDArray, mask: NDArray | None = None) -> Reference:
+    """Read the reference color at a clicked pixel.
+
+    Parameters
+    ----------
+    picture
+        The photo.
+    pixel
+        (x, y) from the top left.
+    white
+        (3,) white of the light.
+    mask
+        Checked coverage of the product, or None.
+
+    Raises
+    ------
+    ReferenceColorError
+        If the pixel lies outside the picture or the mask, or is clipped or black.
+    """
+    x, y = check_pixel(picture, pixel, "Reference pixel")
+    if mask is not None and as_weights(mask[y : y + 1, x : x + 1])[0, 0] <= 0.5:
+        raise ReferenceColorError(
+            f"Reference pixel ({x}, {y}) is outside the mask: pick a pixel of the product that the mask covers."
+        )
+    window = read_window(picture, (x, y), mask)
+    if not np.isfinite(window).all():
+        raise ReferenceColorError(f"Reference pixel ({x}, {y}) is not finite: pick an ordinary pixel.")
+    color = trimmed_mean(window)
+    own = picture.linear(slice(y, y + 1), slice(x, x + 1))[0, 0]
+    if own.max() >= picture.clip_level:
+        raise ReferenceColorError(
+            f"Reference pixel ({x}, {y}) is clipped: a channel is at its maximum, so its color is lost; pick a "
+            "less bright, matte part of the product."
+        )
+    if color.max() <= 0 or (color / white).max() < DARK / 4:
+        raise ReferenceColorError(f"Reference pixel ({x}, {y}) is black: pick a lit, matte part of the product.")
+    return Reference(color, (x, y), _gloss_in(color, picture, (x, y), white, mask))
+
+
+def _gloss_in(color: NDArray, picture: Picture, pixel: tuple[int, int], white: NDArray, mask: NDArray | None) -> float:
+    """How much surface reflection a color holds, as a share of the white, against the matte pixels around it."""
+    if sine(color, white) < 0.1:
+        return 0.0  # almost grey: gloss and body look alike
+    x, y = pixel
+    reach = max(8, round(0.12 * max(picture.shape)))
+    step = max(1, reach // 60)
+    rows, columns = slice(max(0, y - reach), y + reach, step), slice(max(0, x - reach), x + reach, step)
+    around = picture.linear(rows, columns).reshape(-1, 3) / white
+    keep = (around.max(axis=1) > DARK) & ((around * white).max(axis=1) < picture.clip_level)
+    if mask is not None:
+        keep &= as_weights(mask[rows, columns]).reshape(-1) > 0.95
+    # Of the same material: in the plane of this color and the white, on the colored side of it.
+    normal, toward_white = _plane(color / white)
+    body = color / white / np.linalg.norm(color / white)
+    along = np.maximum(around @ body, 1e-9)
+    paler = (around @ toward_white) / along
+    same = keep & (np.abs(around @ normal) / along < 0.035) & (paler < 0.02) & (along > 0.3 * (color / white) @ body)
+    if np.count_nonzero(same) < 20:
+        return 0.0
+    # The matte edge of the wedge: the most colored tenth, without its own outliers.
+    edge = np.quantile(paler[same], 0.1)
+    matte = np.median(around[same & (paler <= edge + 0.005)], axis=0)
+    if sine(matte) < 0.05:
+        return 0.0
+    return float(max(0.0, np.linalg.lstsq(np.column_stack([matte, np.ones(3)]), color / white, rcond=None)[0][1]))
+
+
+def _plane(color: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """For a white-balanced color: unit normal of its plane with grey, and the in-plane direction toward grey."""
+    body = color / np.linalg.norm(color)
+    grey = np.full(3, 3**-0.5)
+    toward = grey - (grey @ body) * body
+    length = np.linalg.norm(toward)
+    if length < 1e-6:  # grey itself: any plane will do
+        other = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+        return np.cross(body, other), other
+    toward = toward / length
+    return np.cross(body, toward), toward
+
+
+def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = None) -> Reference:
+    """Find the product's body color inside the mask: matte, unclipped, not dark, trimmed.
+
+    Gloss makes a color paler and brighter, folds and shadow make it darker and more colored. So: of the pixels of
+    the mask's main color, the well lit ones; of these, those at the colored edge of their wedge toward white,
+    without the outermost; of these, the median.
+
+    Parameters
+    ----------
+    picture
+        The photo.
+    white
+        (3,) white of the light.
+    mask
+        Checked coverage of the product, or None for the whole picture.
+
+    Raises
+    ------
+    ReferenceColorError
+        If every pixel is clipped or black.
+    """
+    pixels = picture.sample(_SAMPLE, mask) if mask is not None else picture.sample(_SAMPLE)
+    pixels = pixels[np.isfinite(pixels).all(axis=1)].astype(np.float64)
+    usable = pixels[(pixels.max(axis=1) < picture.clip_level)]
+    if len(usable) == 0:
+        raise ReferenceColorError(
+            "Every pixel of the product is clipped, so its color is lost: use a darker exposure, or give the "
+            "reference as an RGB color."
+        )
+    balanced = usable / white
+    light = balanced.mean(axis=1)
+    lit = light > max(DARK, 0.05 * float(np.quantile(light, 0.95)))
+    if not lit.any():
+        raise ReferenceColorError(
+            "The product is black everywhere: use a brighter exposure, or give the reference as an RGB color."
+        )
+    balanced, light = balanced[lit], light[lit]
+    same = _main_material(balanced)
+    balanced, light = balanced[same], light[same]
+    well_lit = light >= np.quantile(light, 0.35)
+    balanced = balanced[well_lit]
+    colored = 1 - balanced.min(axis=1) / balanced.mean(axis=1)
+    low, high = np.quantile(colored, (0.55, 0.95))
+    edge = balanced[(colored >= low) & (colored <= high)]
+    return Reference(np.median(edge, axis=0) * white)
+
+
+def _main_material(balanced: NDArray) -> NDArray[np.bool_]:
+    """Which white-balanced pixels (n, 3) share the most frequent hue; all of them if the picture is mostly grey."""
+    total = balanced.sum(axis=1)
+    chroma = balanced / total[:, None] - 1 / 3
+    # Orthogonal axes in the chromaticity plane; the angle is a hue, the length a saturation.
+    x, y = (2 * chroma[:, 0] - chroma[:, 1] - chroma[:, 2]) / 6**0.5, (chroma[:, 1] - chroma[:, 2]) / 2**0.5
+    length = np.hypot(x, y)
+    colored = length > 0.06
+    if np.count_nonzero(colored) < 0.5 * len(balanced):
+        return np.ones(len(balanced), bool) if not colored.any() else ~colored
+    hue = np.arctan2(y, x)
+    votes, _ = np.histogram(hue[colored], bins=72, range=(-np.pi, np.pi), weights=length[colored])
+    smooth = votes + np.roll(votes, 1) + np.roll(votes, -1)
+    peak = (np.argmax(smooth) + 0.5) * 2 * np.pi / 72 - np.pi
+    apart = np.abs((hue - peak + np.pi) % (2 * np.pi) - np.pi)
+    return colored & (apart < np.radians(12))
+
+
+def white_at(picture: Picture, pixel: tuple[int, int], gray: float = 1.0) -> NDArray[np.float64]:
+    """White of the light from a pixel of a white or grey card in the photo.
+
+    Parameters
+    ----------
+    picture
+        The photo.
+    pixel
+        (x, y) on the card.
+    gray
+        Reflectance of the card, 0..1: 1 for a white card, 0.18 for a photographic grey card.
+
+    Returns
+    -------
+    (3,) float64 linear RGB of a perfect diffuser in the light that falls on the card.
+
+    Raises
+    ------
+    WhiteError, ReferenceColorError
+        If the pixel lies outside, or is clipped or black.
+    """
+    x, y = check_pixel(picture, pixel, "White pixel")
+    color = trimmed_mean(read_window(picture, (x, y)))
+    if color.max() >= picture.clip_level:
+        raise WhiteError(
+            f"White pixel ({x}, {y}) is clipped, so its color is lost: pick a darker part of the card, or a grey one."
+        )
+    if color.min() <= 0:
+        raise WhiteError(f"White pixel ({x}, {y}) is black in a channel: pick a lit white or grey card.")
+    return color / gray
+
+
+def white_from_highlights(
+    picture: Picture, locus: NDArray, mask: NDArray | None = None
+) -> tuple[NDArray[np.float64], float]:
+    """Estimate the white of the light from the highlights of one product.
+
+    All pixels of a glossy product lie in one plane through black, which holds the body color and the white
+    (Shafer 1985). The white is where this plane meets the colors that lights have (Finlayson & Schaefer 2001,
+    "Solving for colour constancy using a constrained dichromatic reflection model").
+
+    Parameters
+    ----------
+    picture
+        The photo.
+    locus
+        (n, 3) linear RGB of lights in the photo's space, of luminance 1: black bodies and daylights.
+    mask
+        Checked coverage of the product, or None.
+
+    Returns
+    -------
+    white
+        (3,) float64, of luminance 1.
+    confidence
+        0..1: how clearly highlights stand out and how sharply the plane cuts the locus.
+
+    Raises
+    ------
+    WhiteError
+        If there are no highlights to learn from.
+    """
+    sample = picture.sample(_SAMPLE, mask)
+    pixels = sample[(sample.max(axis=1) < picture.clip_level) & (sample.mean(axis=1) > DARK)].astype(np.float64)
+    if len(pixels) < 50:
+        raise WhiteError(
+            "The product has too few unclipped, lit pixels to find the white: pick a white card or name the light."
+        )
+    body = matte_reference(picture, np.ones(3), mask).color
+    body = body / np.linalg.norm(body)
+    along = pixels @ body
+    across = pixels - along[:, None] * body
+    size = np.linalg.norm(across, axis=1)
+    # Highlights: far from the body line, and brighter than the body usually is.
+    bright = along > np.quantile(along, 0.5)
+    spread = float(np.median(size[bright])) + 1e-9
+    glossy = bright & (size > 4 * spread) & (size > 0.03)
+    if np.count_nonzero(glossy) < max(20, 0.0005 * len(pixels)):
+        raise WhiteError("The product shows no highlights to find the white from: pick a white card or name the light.")
+    # The plane: the body line, and the main direction in which highlights leave it.
+    _, strength, directions = np.linalg.svd(across[glossy], full_matrices=False)
+    normal = np.cross(body, directions[0])
+    normal /= np.linalg.norm(normal)
+    # Of the lights, the one nearest to the plane, on the side of the body to which highlights go.
+    lights = locus / np.linalg.norm(locus, axis=1, keepdims=True)
+    toward = directions[0] * np.sign(np.sum(across[glossy] @ directions[0]))
+    off = np.abs(lights @ normal)
+    off[(lights - (lights @ body)[:, None] * body) @ toward <= 0] = np.inf
+    best = int(np.argmin(off))
+    if not np.isfinite(off[best]) or off[best] > 0.1:
+        raise WhiteError(
+            "The highlights do not point to the color of any usual light: pick a white card or name the light."
+        )
+    flat = 1 - min(1.0, float(strength[1] / strength[0]) * 2)
+    # A plane that runs along the locus cuts it nowhere in particular.
+    near = off < off[best] + 0.01
+    sharp = 1 - np.count_nonzero(near) / len(locus)
+    return locus[best].astype(np.float64), float(np.clip(flat * sharp, 0, 1))

@@ -1,0 +1,329 @@
+"""The region that a click means, in dichromatic terms: all of one material, whatever its shading and gloss.
+
+Shading moves a pixel along the line from black through the body color, gloss moves it from there toward the white.
+So a pixel is of the clicked material if it lies in the plane of body color and white, near the body line; how
+bright it is does not matter. From the click this grows over connected pixels, bridges narrow gaps (a strap, a
+seam), and takes in what the material surrounds: highlights, clipped cores and deep shadow, but not a patch of
+another color.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .compositing import box_sum
+from .errors import MaskError
+from .picture import Picture, as_weights
+from .reference import DARK, _plane, check_pixel, read_window, trimmed_mean
+
+# Pixels of the reduced picture on which the region is grown.
+_WORKING_PIXELS = 600_000
+
+# Half the step of 8-bit sRGB codes near black, in linear light.
+_DARK_STEP = 1.5e-4
+
+
+@dataclass(frozen=True)
+class _Tolerance:
+    """Angles, in degrees, within which a pixel counts as of the material.
+
+    Out of the plane of body color and white; within the plane, toward the white and away from it. `tilt` is the
+    slope by which the plane itself is turned about the body color: what a white that is not quite right does.
+    """
+
+    out: float
+    toward: float
+    away: float
+    tilt: float = 0.0
+
+
+# The first growth is strict. What it finds shows how far the material itself scatters, and the second growth
+# accepts four times that, within these bounds.
+_STRICT = _Tolerance(1.6, 4.0, 4.0)
+_LEAST = _Tolerance(1.8, 4.5, 4.5)
+_MOST = _Tolerance(4.0, 14.0, 10.0)
+_MOST_TILT = 0.4
+
+# How far highlights may leave the plane, as a slope: lights differ a little, and clipping bends them.
+_GLOSS_SLOPE = 0.18
+
+
+def region_at(
+    picture: Picture, click: tuple[int, int], white: NDArray | None = None, tolerance: float = 1.0
+) -> NDArray[np.uint8]:
+    """Select the material under a click.
+
+    Parameters
+    ----------
+    picture
+        The photo.
+    click
+        (x, y) from the top left, on a matte, lit part of the product.
+    white
+        (3,) white of the light; None for ones.
+    tolerance
+        Factor on the accepted difference in color: 0.5 is strict, 2 is generous.
+
+    Returns
+    -------
+    (height, width) uint8 coverage, 255 inside, with a soft edge of one to three pixels.
+
+    Raises
+    ------
+    ReferenceColorError
+        If the click lies outside the picture.
+    MaskError
+        If the click is on black, or the tolerance is not above zero.
+    """
+    if not tolerance > 0:
+        raise MaskError(f"Tolerance {tolerance} is not above zero: 1 is ordinary, 0.5 strict, 2 generous.")
+    x, y = check_pixel(picture, click, "Click")
+    w = np.ones(3) if white is None else np.asarray(white, np.float64)
+    height, width = picture.shape
+    step = max(1, int(np.ceil(np.sqrt(height * width / _WORKING_PIXELS))))
+    small = shrink(picture, step) / w
+    body = trimmed_mean(read_window(picture, (x, y))) / w
+    if body.max() < DARK / 4:
+        raise MaskError(f"Click ({x}, {y}) is on black: click a lit part of the product.")
+    start = min(y // step, small.shape[0] - 1), min(x // step, small.shape[1] - 1)
+    grower = _Grower(small, start, picture.clip_level)
+    own = _STRICT
+    for _ in range(2):
+        body, own = grower.learn(grower.grow(body, _times(own, tolerance)), body)
+    return _soft_edge(picture, grower.grow(body, _times(own, tolerance)), step)
+
+
+def _times(t: _Tolerance, factor: float) -> _Tolerance:
+    return _Tolerance(t.out * factor, t.toward * factor, t.away * factor, t.tilt)
+
+
+def shrink(picture: Picture, step: int) -> NDArray[np.float32]:
+    """Mean of every step x step block of linear light; incomplete blocks at the right and bottom are left out."""
+    height, width = picture.shape
+    if step == 1:
+        return picture.linear()
+    rows, columns = height // step, width // step
+    out = np.empty((rows, columns, 3), np.float32)
+    for k in range(rows):
+        block = picture.linear(slice(k * step, (k + 1) * step), slice(0, columns * step))
+        out[k] = block.reshape(step, columns, step, 3).mean(axis=(0, 2))
+    return out
+
+
+def _half_range(values: NDArray) -> float:
+    low, high = np.quantile(values, (0.16, 0.84))
+    return float(high - low) / 2
+
+
+class _Grower:
+    """Growth of one region on the reduced, white-balanced picture."""
+
+    def __init__(self, balanced: NDArray, start: tuple[int, int], clip: float) -> None:
+        self.balanced, self.start = balanced, start
+        self.clipped = balanced.max(axis=-1) >= clip
+
+    def _angles(self, body: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Light along the body color, and the components out of the plane and toward the white."""
+        normal, toward = _plane(body)
+        unit = body / np.linalg.norm(body)
+        return self.balanced @ unit, self.balanced @ normal, self.balanced @ toward
+
+    def grow(self, body: NDArray, tolerance: _Tolerance) -> NDArray[np.bool_]:
+        """Select what is of this body color and hangs together with the start."""
+        along, out, paler = self._angles(body)
+        untilted, out = out, out - tolerance.tilt * paler
+        safe = np.maximum(along, 1e-6)
+        # Light that met the material twice, in dark folds, is more colored and turned a little in hue.
+        folded = 1 + 0.6 * ((paler < 0) & (along < 0.25 * float(np.linalg.norm(body))))
+        # The step of an 8-bit code near black turns the color of dark pixels.
+        blur = 2 * _DARK_STEP
+        slope = np.tan(np.radians(np.minimum([tolerance.out, tolerance.toward, tolerance.away], 80)))
+        lit = along > max(0.01 * float(np.linalg.norm(body)), DARK / 4)
+        similar = lit & (np.abs(out) <= slope[0] * folded * safe + blur)
+        similar &= (paler <= slope[1] * safe + blur) & (-paler <= slope[2] * safe + blur)
+        similar[self.start] = True
+        core = _connected(similar, self.start)
+        # What the material surrounds: gloss near the plane, clipped pixels, shadow too dark to have a color.
+        size = np.linalg.norm(self.balanced, axis=-1)
+        glossy = (np.minimum(np.abs(out), np.abs(untilted)) <= _GLOSS_SLOPE * size + blur) & (along > 0)
+        rest = ~core & (glossy | self.clipped | ~lit)
+        return core | _surrounded(rest, core, most=0.02 * np.count_nonzero(core))
+
+    def learn(self, inside: NDArray, body: NDArray) -> tuple[NDArray, _Tolerance]:
+        """Body color and tolerance of the material, from what a strict growth found."""
+        pixels = self.balanced[inside]
+        if len(pixels) < 30:
+            return body, _LEAST
+        light = pixels.sum(axis=1)
+        lit = pixels[light >= np.median(light)]
+        body = np.median(lit / lit.sum(axis=1, keepdims=True), axis=0) * body.sum()
+        along, out, paler = (values[inside] for values in self._angles(body))
+        usable = along > 0.2 * np.median(along)
+        off, pale = (np.degrees(np.arctan2(c[usable], along[usable])) for c in (out, paler))
+        # Where the material varies enough along the plane to show it, the plane is learned too.
+        tilt = 0.0
+        if np.std(pale) > 1.0:
+            tilt = float(np.clip(np.median(off * pale) / np.median(pale * pale), -_MOST_TILT, _MOST_TILT))
+        wide, long = (4 * _half_range(values) for values in (off - tilt * pale, pale))
+        return body, _Tolerance(
+            float(np.clip(wide, _LEAST.out, _MOST.out)),
+            float(np.clip(long, _LEAST.toward, _MOST.toward)),
+            float(np.clip(long, _LEAST.away, _MOST.away)),
+            tilt,
+        )
+
+
+def label(mask: NDArray) -> tuple[NDArray[np.int32], int]:
+    """Number the 4-connected parts of a (h, w) bool mask.
+
+    Returns
+    -------
+    labels
+        (h, w) int32: 0 outside, 1..n inside.
+    n
+        Number of parts.
+
+    Notes
+    -----
+    Runs of pixels in a row are joined to the runs they touch in the next row, and each takes the smallest number
+    of its neighbors, with pointer jumping, until nothing changes.
+    """
+    height, width = mask.shape
+    padded = np.zeros((height, width + 2), np.int8)
+    padded[:, 1:-1] = mask
+    change = np.diff(padded, axis=1)
+    row, begin = np.nonzero(change == 1)
+    _, end = np.nonzero(change == -1)
+    if len(row) == 0:
+        return np.zeros((height, width), np.int32), 0
+    # Two runs in neighboring rows touch if each begins before the other ends: candidates by binary search.
+    key_begin, key_end = row * (width + 1) + begin, row * (width + 1) + end
+    first = np.searchsorted(key_end, (row + 1) * (width + 1) + begin, side="right")
+    last = np.searchsorted(key_begin, (row + 1) * (width + 1) + end, side="left")
+    counts = np.maximum(last - first, 0)
+    upper = np.repeat(np.arange(len(row)), counts)
+    lower = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(first, counts)
+    parent = np.arange(len(row))
+    while len(upper):
+        a, b = parent[upper], parent[lower]
+        differ = a != b
+        if not differ.any():
+            break
+        upper, lower, a, b = upper[differ], lower[differ], a[differ], b[differ]
+        np.minimum.at(parent, np.maximum(a, b), np.minimum(a, b))
+        while True:
+            jumped = parent[parent]
+            if np.array_equal(jumped, parent):
+                break
+            parent = jumped
+    _, number = np.unique(parent, return_inverse=True)
+    starts = np.zeros(height * (width + 1) + 1, np.int32)
+    starts[key_begin] = number + 1
+    np.subtract.at(starts, key_end, (number + 1).astype(np.int32))
+    labels = np.cumsum(starts[:-1].reshape(height, width + 1)[:, :width], axis=1, dtype=np.int32)
+    return labels, int(number.max()) + 1
+
+
+# How far growth may jump, as a share of the picture's longer side, to a part of at least this share of what was
+# selected so far: over seams to small parts, over a strap to large ones.
+_JUMPS = ((0.012, 0.002), (0.04, 0.05))
+
+
+def _connected(similar: NDArray, start: tuple[int, int]) -> NDArray[np.bool_]:
+    """Parts of `similar` that hang together with `start`, over narrow gaps too."""
+    # Parts joined by a thread of mixed pixels only are not one: they are told apart by their kernels.
+    kernel = box_sum(similar, 1) > 8.5
+    if not kernel[start]:
+        kernel |= (box_sum(_only(start, similar.shape), 2) > 0.5) & similar
+    labels, count = label(kernel)
+    sizes = np.bincount(labels.ravel(), minlength=count + 1)
+    chosen = np.zeros(count + 1, bool)
+    chosen[labels[start]] = True
+    while True:
+        inside = chosen[labels]
+        total = np.count_nonzero(inside)
+        added = False
+        for reach, least in _JUMPS:
+            near = box_sum(inside, max(2, round(reach * max(similar.shape)))) > 0.5
+            reached = np.unique(labels[near])
+            new = reached[(reached > 0) & ~chosen[reached] & (sizes[reached] >= max(12, least * total))]
+            chosen[new] = True
+            added |= len(new) > 0
+        if not added:
+            return (box_sum(inside, 2) > 0.5) & similar
+
+
+def _only(position: tuple[int, int], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    mask = np.zeros(shape, bool)
+    mask[position] = True
+    return mask
+
+
+def _surrounded(rest: NDArray, core: NDArray, most: float) -> NDArray[np.bool_]:
+    """Parts of `rest`, of up to `most` pixels, whose outline lies mostly against `core`."""
+    labels, count = label(rest)
+    against, outline = np.zeros(count + 1), np.zeros(count + 1)
+    for axis in (0, 1):
+        for sign in (1, -1):
+            beside = np.roll(core, sign, axis)
+            other = np.roll(labels, sign, axis)
+            edge = (labels > 0) & (other != labels)
+            outline += np.bincount(labels[edge], minlength=count + 1)
+            against += np.bincount(labels[edge & beside], minlength=count + 1)
+    sizes = np.bincount(labels.ravel(), minlength=count + 1)
+    keep = (against > 0.5 * np.maximum(outline, 1)) & (sizes <= most)
+    keep[0] = False
+    return keep[labels]
+
+
+def _soft_edge(picture: Picture, grown: NDArray[np.bool_], step: int) -> NDArray[np.uint8]:
+    """Full-size coverage: along the outline, each pixel is unmixed between the colors on its two sides."""
+    height, width = picture.shape
+    full = np.zeros((height, width), np.uint8)
+    big = np.repeat(np.repeat(grown, step, axis=0), step, axis=1)
+    full[: big.shape[0], : big.shape[1]] = big[:height, :width] * np.uint8(255)
+    if big.shape[0] < height:
+        full[big.shape[0] :] = full[big.shape[0] - 1]
+    if big.shape[1] < width:
+        full[:, big.shape[1] :] = full[:, big.shape[1] - 1 : big.shape[1]]
+    reach = step + 1  # half width of the band in which the outline may truly lie
+    look = reach + 3 + step  # how far to look for pure colors
+    result = full.copy()
+    strip = max(1, 16 * 24_000 // width)
+    for top in range(0, height, strip):
+        bottom = min(height, top + strip)
+        first, last = max(0, top - look - reach), min(height, bottom + look + reach)
+        inside = full[first:last] > 0
+        if inside.all() or not inside.any():
+            continue
+        near_in = box_sum(inside, reach)
+        near_all = box_sum(np.ones_like(inside), reach)
+        band = (near_in > 0.5) & (near_in < near_all - 0.5)
+        own = band[top - first : bottom - first]
+        if not own.any():
+            continue
+        linear = picture.linear(slice(first, last))
+        means = []
+        for pure in (inside & ~band, ~inside & ~band):
+            count = box_sum(pure, look)[..., None]
+            light = box_sum(linear * pure[..., None], look)
+            means.append((light / np.maximum(count, 1), count[..., 0] > 0.5))
+        (product, has_product), (behind, has_behind) = means
+        across = product - behind
+        length = np.einsum("ijk,ijk->ij", across, across)
+        share = np.einsum("ijk,ijk->ij", linear - behind, across) / np.maximum(length, 1e-12)
+        known = has_product & has_behind & (length > 1e-6)
+        cover = np.where(known, np.clip(share, 0, 1), inside)
+        # Nearly pure pixels are pure: noise is not transparency.
+        cover = np.clip((cover - 0.08) / 0.84, 0, 1)
+        part = result[top:bottom]
+        part[own] = np.round(cover[top - first : bottom - first][own] * 255).astype(np.uint8)
+    return result
+
+
+def coverage(mask: NDArray) -> float:
+    """Share of the picture that a checked mask covers, 0..1."""
+    return float(as_weights(mask).mean(dtype=np.float64))
