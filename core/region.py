@@ -50,6 +50,9 @@ _MOST_TILT = 0.4
 # How far highlights may leave the plane, as a slope: lights differ a little, and clipping bends them.
 _GLOSS_SLOPE = 0.18
 
+# How far folds may leave it.
+_FOLD_SLOPE = 0.21
+
 
 def region_at(
     picture: Picture, click: tuple[int, int], white: NDArray | None = None, tolerance: float = 1.0
@@ -89,7 +92,7 @@ def region_at(
     if body.max() < DARK / 4:
         raise MaskError(f"Click ({x}, {y}) is on black: click a lit part of the product.")
     start = min(y // step, small.shape[0] - 1), min(x // step, small.shape[1] - 1)
-    grower = _Grower(small, start, picture.clip_level)
+    grower = _Grower(small, w, start, picture.clip_level)
     own = _STRICT
     for _ in range(2):
         body, own = grower.learn(grower.grow(body, _times(own, tolerance)), body)
@@ -121,9 +124,9 @@ def _half_range(values: NDArray) -> float:
 class _Grower:
     """Growth of one region on the reduced, white-balanced picture."""
 
-    def __init__(self, balanced: NDArray, start: tuple[int, int], clip: float) -> None:
-        self.balanced, self.start = balanced, start
-        self.clipped = balanced.max(axis=-1) >= clip
+    def __init__(self, balanced: NDArray, white: NDArray, start: tuple[int, int], clip: float) -> None:
+        self.balanced, self.white, self.start = balanced, white, start
+        self.clipped = (balanced * white).max(axis=-1) >= clip
 
     def _angles(self, body: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Light along the body color, and the components out of the plane and toward the white."""
@@ -136,21 +139,25 @@ class _Grower:
         along, out, paler = self._angles(body)
         untilted, out = out, out - tolerance.tilt * paler
         safe = np.maximum(along, 1e-6)
-        # Light that met the material twice, in dark folds, is more colored and turned a little in hue.
-        folded = 1 + 0.6 * ((paler < 0) & (along < 0.25 * float(np.linalg.norm(body))))
-        # The step of an 8-bit code near black turns the color of dark pixels.
-        blur = 2 * _DARK_STEP
+        # The step of an 8-bit code near black turns the color of dark pixels, most where the white is low.
+        normal, toward = _plane(body)
+        blur, blur_toward = (3 * _DARK_STEP * float(np.linalg.norm(axis / self.white)) for axis in (normal, toward))
         slope = np.tan(np.radians(np.minimum([tolerance.out, tolerance.toward, tolerance.away], 80)))
         lit = along > max(0.01 * float(np.linalg.norm(body)), DARK / 4)
-        similar = lit & (np.abs(out) <= slope[0] * folded * safe + blur)
-        similar &= (paler <= slope[1] * safe + blur) & (-paler <= slope[2] * safe + blur)
+        similar = lit & (np.abs(out) <= slope[0] * safe + blur)
+        similar &= (paler <= slope[1] * safe + blur_toward) & (-paler <= slope[2] * safe + blur_toward)
         similar[self.start] = True
         core = _connected(similar, self.start)
-        # What the material surrounds: gloss near the plane, clipped pixels, shadow too dark to have a color.
+        # What the material surrounds: gloss near the plane, clipped pixels, shadow too dark to have a color, folds.
         size = np.linalg.norm(self.balanced, axis=-1)
         glossy = (np.minimum(np.abs(out), np.abs(untilted)) <= _GLOSS_SLOPE * size + blur) & (along > 0)
-        rest = ~core & (glossy | self.clipped | ~lit)
-        return core | _surrounded(rest, core, most=0.02 * np.count_nonzero(core))
+        # Deep folds: light that met the material twice is darker, more colored and turned in hue.
+        folded = (along < 0.7 * float(np.linalg.norm(body))) & (paler < 0) & (np.abs(out) <= _FOLD_SLOPE * safe + blur)
+        most = 0.02 * np.count_nonzero(core)
+        found = core.copy()
+        for kind in (glossy | self.clipped, folded | ~lit):
+            found |= _surrounded(kind & ~core, core, most)
+        return found
 
     def learn(self, inside: NDArray, body: NDArray) -> tuple[NDArray, _Tolerance]:
         """Body color and tolerance of the material, from what a strict growth found."""
@@ -229,7 +236,7 @@ def label(mask: NDArray) -> tuple[NDArray[np.int32], int]:
 
 # How far growth may jump, as a share of the picture's longer side, to a part of at least this share of what was
 # selected so far: over seams to small parts, over a strap to large ones.
-_JUMPS = ((0.012, 0.002), (0.04, 0.05))
+_JUMPS = ((0.01, 0.0005), (0.022, 0.003), (0.04, 0.05))
 
 
 def _connected(similar: NDArray, start: tuple[int, int]) -> NDArray[np.bool_]:
@@ -274,7 +281,7 @@ def _surrounded(rest: NDArray, core: NDArray, most: float) -> NDArray[np.bool_]:
             outline += np.bincount(labels[edge], minlength=count + 1)
             against += np.bincount(labels[edge & beside], minlength=count + 1)
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
-    keep = (against > 0.5 * np.maximum(outline, 1)) & (sizes <= most)
+    keep = (against > 0.45 * np.maximum(outline, 1)) & (sizes <= most)
     keep[0] = False
     return keep[labels]
 
