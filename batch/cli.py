@@ -7,6 +7,7 @@ commands, so that `--help` is instant.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
 from collections.abc import Sequence
@@ -209,7 +210,7 @@ def _region_options(text: str) -> dict[str, str]:
     return found
 
 
-def _region(given: dict):  # noqa: ANN202, numpy is not imported yet where this is defined
+def _region(given: dict):
     from ..core.errors import RecipeError
     from ..core.recipe import Region
     from ..core.swatches import parse_target
@@ -220,10 +221,8 @@ def _region(given: dict):  # noqa: ANN202, numpy is not imported yet where this 
         raise RecipeError(f"Tolerance '{given['tolerance']}' is not a number: 1 is ordinary.") from None
     residual: str | float = given["residual"]
     if isinstance(residual, str):
-        try:
+        with contextlib.suppress(ValueError):  # a word is checked where it is used
             residual = float(residual)
-        except ValueError:
-            pass  # a word: checked where it is used
     reference = given["reference"]
     return Region(
         target=parse_target(given["target"]) if given["target"] else None,
@@ -247,9 +246,8 @@ def _open(options: argparse.Namespace) -> tuple[files.Photo, Prepared]:
 
 
 def _recolor(options: argparse.Namespace) -> int:
-    from . import files, photo
-
     from ..core.errors import RecipeError
+    from . import files, photo
 
     if not 1 <= options.quality <= 100:
         raise RecipeError(f"Quality {options.quality} is not in 1..100: 95 is very good.")

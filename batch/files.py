@@ -5,8 +5,10 @@ OpenImageIO decodes and encodes the pixels; `metadata` carries everything else o
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -338,7 +340,7 @@ def _space(blocks: Blocks, spec: Any, kind: str, dtype: np.dtype, grey: bool) ->
     if code is not None and len(code) >= 4:
         return _cicp(code[0], code[1], code[2], code[3]), True, []
     if kind == "exr" and (given := spec.getattribute("CICP")):
-        return _cicp(*given[:3], 1), True, []
+        return _cicp(given[0], given[1], given[2], 1), True, []
     if blocks.icc:
         if grey and icc.data_space(blocks.icc) == "GRAY":
             name = icc.description(blocks.icc)
@@ -467,7 +469,7 @@ def _read_raw(path: Path, color_space: str | None) -> Photo:
     primaries = {
         "linear-srgb": rawpy.ColorSpace.sRGB,
         "linear-p3": rawpy.ColorSpace.P3D65,
-        "linear-rec2020": rawpy.ColorSpace.rec2020,
+        "linear-rec2020": rawpy.ColorSpace.Rec2020,
     }
     name = name.strip().lower()
     if name not in primaries:
@@ -495,6 +497,7 @@ def _read_raw(path: Path, color_space: str | None) -> Photo:
         raise _damaged(path, reason) from None
     blocks = _extract(path)
     found = Blocks(exif=blocks.exif, xmp=blocks.xmp) if blocks.kind == "tiff" else Blocks()
+    metadata.upright(found)
     return Photo(path, pixels, SPACES[name], False, white, tuple(notes), _Source("raw", found, None, True, False))
 
 
@@ -668,7 +671,7 @@ def write(
     quality
         1 to 100, of JPEG and lossy WebP. A WebP made from a lossless WebP is lossless.
     compression
-        Of TIFF or EXR, by OpenImageIO's name, such as ``zip``; None keeps the source's, or is ``zip``.
+        Of TIFF or EXR, by OpenImageIO's name, such as ``zip``; None keeps the source's, or is lzw or zip.
 
     Returns
     -------
@@ -765,7 +768,9 @@ def _output_spec(pixels: NDArray, kind: str, path: Path, photo: Photo, quality: 
         allowed = _TIFF_COMPRESSIONS if kind == "tiff" else _EXR_COMPRESSIONS
         if compression is not None and compression.split(":")[0] not in allowed:
             raise FileError(f"The compression '{compression}' is not known for {kind}: use {', '.join(allowed)}.")
-        spec.attribute("Compression", compression or (own if own in allowed else "zip"))
+        # For 8 bits, LZW packs nearly as well as zip in a quarter of the time.
+        usual = "lzw" if kind == "tiff" and pixels.dtype == np.uint8 else "zip"
+        spec.attribute("Compression", compression or (own if own in allowed else usual))
     elif compression is not None:
         raise FileError(f"'{path}' takes no compression: leave the option out, or write a TIFF or EXR.")
 
@@ -785,7 +790,6 @@ def _output_spec(pixels: NDArray, kind: str, path: Path, photo: Photo, quality: 
     elif kind == "tiff":
         spec.attribute("tiff:write_exif", 0)
         spec.attribute("tiff:half", 1)
-        spec.attribute("tiff:zipquality", 3)
     else:
         _exr_attributes(spec, path, photo)
     return spec
@@ -850,29 +854,55 @@ def _output_blocks(kind: str, path: Path, photo: Photo) -> Blocks:
 
 
 def _encode(path: Path, spec: Any, pixels: NDArray) -> None:
+    if path.suffix.lower() in (".jpg", ".jpeg", ".webp"):
+        _encode_in_memory(path, spec, pixels)
+    else:
+        _write_image(path, str(path), spec, pixels)
+
+
+def _encode_in_memory(path: Path, spec: Any, pixels: NDArray) -> None:
+    """Encode where room does not end, and store the result.
+
+    When a disk is full, libjpeg ends the whole process and OpenImageIO's WebP writer repeats itself forever, so
+    neither may write to one. Where there are no files in memory, more room is asked for than they can need.
+    """
+    most = pixels.nbytes * 3 // 2 + (1 << 20)
+    if os.name == "posix":
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]  # holds for files in memory as well
+        if limit != resource.RLIM_INFINITY and limit < most:
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+    if not hasattr(os, "memfd_create"):
+        if shutil.disk_usage(path.parent).free < most:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        _write_image(path, str(path), spec, pixels)
+        return
+    memory = os.memfd_create("dyehouse")
+    try:
+        _write_image(path, f"/proc/self/fd/{memory}", spec, pixels)
+        os.lseek(memory, 0, os.SEEK_SET)
+        with path.open("wb") as file:
+            while part := os.read(memory, 1 << 20):
+                file.write(part)
+    finally:
+        os.close(memory)
+
+
+def _write_image(path: Path, target: str, spec: Any, pixels: NDArray) -> None:
     import OpenImageIO
 
     output = OpenImageIO.ImageOutput.create(str(path))
     if output is None:
         raise FileError(f"'{path.name}' cannot be encoded ({OpenImageIO.geterror()}): use another extension.")
-    done = output.open(str(path), spec) and output.write_image(pixels)
+    done = output.open(target, spec) and output.write_image(pixels)
     reason = output.geterror()
     closed = output.close()
     reason = reason or output.geterror()
     if not (done and closed) or reason:
-        first = reason.strip().split("\n")[0] or "the encoder gave no reason"
-        raise OSError(0, _room(path, first))
-
-
-def _room(path: Path, reason: str) -> str:
-    """Say that the disk is full where encoders only say that they failed."""
-    import shutil
-
-    try:
-        free = shutil.disk_usage(path.parent).free
-    except OSError:
-        return reason
-    return f"No space left on device; {reason}" if free < 1 << 16 else reason
+        first = reason.replace(str(path), "the file").strip().split("\n")[0].rstrip(" .")
+        full = shutil.disk_usage(path.parent).free < 1 << 16
+        raise OSError(0, "No space left on device" if full else first or "the encoder gave no reason")
 
 
 def write_map(path: str | Path, array: NDArray, *, force: bool = False, scale: float = 1.0) -> Path:

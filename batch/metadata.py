@@ -25,6 +25,7 @@ from ..core.errors import FileError
 type Tags = dict[int, tuple[int, int, bytes]]
 """TIFF tag to its type, count and little-endian value."""
 
+_DAMAGE = (struct.error, IndexError, OverflowError, ValueError, zlib.error)
 _ICC = b"ICC_PROFILE\0"
 _EXIF = b"Exif\0\0"
 _XMP = b"http://ns.adobe.com/xap/1.0/\0"
@@ -136,8 +137,10 @@ def extract(path: Path) -> Blocks:
             elif head[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
                 blocks.kind = "tiff"
                 _extract_tiff(file, blocks)
-        except (struct.error, IndexError, zlib.error):
+        except _DAMAGE:
             pass
+    if blocks.density and not all(0 < side < 1e6 for side in blocks.density[:2]):
+        blocks.density = None
     if blocks.exif and blocks.kind != "tiff":
         tags = exif_tags(blocks.exif)[0]
         blocks.orientation = _number(tags, 0x0112, 1)
@@ -150,7 +153,7 @@ def exif_tags(exif: bytes) -> tuple[Tags, dict[int, Tags]]:
     """Return the tags of a TIFF stream: of its first directory, and of those it points to."""
     try:
         return _read_tree(io.BytesIO(exif))[:2]
-    except (struct.error, IndexError):
+    except _DAMAGE:
         return {}, {}
 
 
@@ -190,7 +193,7 @@ def _upright_exif(exif: bytes, orientation: int) -> bytes:
         start = struct.unpack_from(order + "I", data, 4)[0]
         places, after = _places(data, order, start)
         if 0x0112 in places:
-            struct.pack_into(order + "H", data, places[0x0112] + 8, 1)
+            struct.pack_into(order + "HIHH", data, places[0x0112] + 2, 3, 1, 1, 0)
         if orientation >= 5 and EXIF_IFD in places:
             sub = struct.unpack_from(order + "I", data, places[EXIF_IFD] + 8)[0]
             inner, _ = _places(data, order, sub)
@@ -209,18 +212,18 @@ def _upright_exif(exif: bytes, orientation: int) -> bytes:
                     del data[offset:]
                 elif offset + length < len(data):
                     data[offset : offset + length] = bytes(length)
-    except (struct.error, KeyError, IndexError):
-        return exif
+    except (*_DAMAGE, KeyError):
+        pass  # what follows the damage stays as it is
     return bytes(data)
 
 
 def _places(data: bytearray, order: str, start: int) -> tuple[dict[int, int], int]:
     """Return where the entries of a directory stand, and where its link to the next directory stands."""
     count = struct.unpack_from(order + "H", data, start)[0]
-    places = {}
+    places: dict[int, int] = {}
     for i in range(count):
         place = start + 2 + 12 * i
-        places[struct.unpack_from(order + "H", data, place)[0]] = place
+        places.setdefault(struct.unpack_from(order + "H", data, place)[0], place)
     return places, start + 2 + 12 * count
 
 
@@ -301,14 +304,14 @@ def _read_tree(file: BinaryIO) -> tuple[Tags, dict[int, Tags], int]:
         if kind in (4, 13, 16, 18):
             try:
                 subs[tag] = _read_directory(file, order, big, int.from_bytes(value, "little"))[0]
-            except struct.error:
+            except _DAMAGE:
                 continue
     pages, seen = 1, {start}
     while following and following not in seen and len(seen) < 1000:
         seen.add(following)
         try:
             tags, following = _read_directory(file, order, big, following)
-        except struct.error:
+        except _DAMAGE:
             break
         # Bit 0 of NewSubfileType marks a smaller copy of another picture, which is no page.
         pages += not _number(tags, 254, 0) & 1
@@ -607,7 +610,7 @@ def _chunk(name: bytes, body: bytes) -> bytes:
 
 def _riff(file: BinaryIO) -> list[tuple[bytes, int, int]]:
     """Return the chunks of a WebP as (name, where the body starts, its size)."""
-    found = []
+    found: list[tuple[bytes, int, int]] = []
     place = 12
     while True:
         file.seek(place)

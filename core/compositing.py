@@ -12,7 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .picture import Picture, as_weights
+from .neighborhood import mean_nearby
+from .picture import Picture, as_weights, strips
+
+# Coverage that close to 0 or 1 counts as none or all.
+_CLEAR = 0.004
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,23 +41,6 @@ class Edge:
         return slice(int(first), int(last))
 
 
-def box_sum(values: NDArray, radius: int) -> NDArray[np.float64]:
-    """Sum over the (2 radius + 1) square around every pixel of (h, w) or (h, w, c), cut off at the border."""
-    height, width = values.shape[:2]
-    table = np.zeros((height + 1, width + 1, *values.shape[2:]))
-    np.cumsum(np.cumsum(values, axis=0, dtype=np.float64), axis=1, out=table[1:, 1:])
-    top, bottom = (
-        np.clip(np.arange(height) - radius, 0, None),
-        np.clip(np.arange(height) + radius + 1, None, height),
-    )
-    left, right = (
-        np.clip(np.arange(width) - radius, 0, None),
-        np.clip(np.arange(width) + radius + 1, None, width),
-    )
-    rows = table[bottom] - table[top]
-    return rows[:, right] - rows[:, left]
-
-
 def unmix_edge(picture: Picture, mask: NDArray, radius: int = 6) -> Edge | None:
     """Find the product's share in every pixel of soft coverage, from the background beside it.
 
@@ -71,29 +58,21 @@ def unmix_edge(picture: Picture, mask: NDArray, radius: int = 6) -> Edge | None:
     The edge, or None where the mask has no soft pixel.
     """
     height, width = picture.shape
-    parts: list[tuple[NDArray, NDArray, NDArray]] = []
-    strip = max(1, 16 * 24_000 // width)
-    for top in range(0, height, strip):
-        bottom = min(height, top + strip)
-        first, last = max(0, top - radius), min(height, bottom + radius)
-        own = as_weights(mask[top:bottom])
-        soft = (own > 0.004) & (own < 0.996)
-        if not soft.any():
+    found: list[tuple[NDArray, NDArray, NDArray]] = []
+    for top, bottom in strips(height, width):
+        cover = as_weights(mask[top:bottom])
+        rows, columns = np.nonzero((cover > _CLEAR) & (cover < 1 - _CLEAR))
+        if len(rows) == 0:
             continue
-        columns = np.flatnonzero(soft.any(axis=0))
-        left, right = max(0, int(columns[0]) - radius), min(width, int(columns[-1]) + 1 + radius)
-        linear = picture.linear(slice(first, last), slice(left, right))
-        outside = as_weights(mask[first:last, left:right]) <= 0.004
-        count = box_sum(outside, radius)[top - first : bottom - first]
-        light = box_sum(linear * outside[..., None], radius)[top - first : bottom - first]
-        y, x = np.nonzero(soft[:, left:right])
-        cover, n = own[:, left:right][y, x][:, None], count[y, x][:, None]
-        pixels = linear[top - first : bottom - first][y, x]
-        background = light[y, x] / np.maximum(n, 1)
-        share = np.where(n > 0, pixels - (1 - cover) * background, cover * pixels)
+        first = max(0, top - radius)
+        outside = as_weights(mask[first : bottom + radius]) <= _CLEAR
+        background, known = mean_nearby(picture, outside, rows + top, columns, radius, top=first)
+        a = cover[rows, columns][:, None]
+        pixels = picture.at(rows + top, columns)
+        share = np.where(known[:, None], pixels - (1 - a) * background, a * pixels)
         # No more light than the pixel has, and none below zero beyond what the pixel itself shows.
         share = np.clip(share, np.minimum(pixels, 0), np.maximum(pixels, 0))
-        parts.append((y + top, x + left, share.astype(np.float32)))
-    if not parts:
+        found.append((rows + top, columns, share.astype(np.float32)))
+    if not found:
         return None
-    return Edge(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return Edge(*(np.concatenate(column) for column in zip(*found, strict=True)))

@@ -19,7 +19,7 @@ def out_of_gamut(linear: NDArray) -> NDArray[np.bool_]:
     return (np.maximum(np.maximum(r, g), b) > 1 + TOLERANCE) | (np.minimum(np.minimum(r, g), b) < -TOLERANCE)
 
 
-def fit_to_gamut(linear: NDArray[np.float32]) -> float:
+def fit_to_gamut(linear: NDArray[np.float32]) -> int:
     """Bring pixels into 0..1, in place, keeping hue and luminance and giving up chroma.
 
     Each pixel outside moves along the straight line to the grey of its own luminance until it is inside: the hue

@@ -70,6 +70,10 @@ class Picture:
             return part
         return transfer.decode(part, self.curve)
 
+    def at(self, rows: NDArray, columns: NDArray) -> NDArray[np.float32]:
+        """(n, 3) linear RGB of n pixels."""
+        return transfer.decode(self.pixels[rows, columns, :3], self.curve)
+
     def sample(self, most: int, mask: NDArray | None = None) -> NDArray[np.float32]:
         """(n, 3) linear pixels on a regular grid, about `most` of them or all; with a mask, well inside it only."""
         height, width = self.shape
@@ -101,6 +105,13 @@ def bands(height: int, width: int, start: int = 0) -> Iterator[slice]:
     rows = max(1, BAND_PIXELS // max(1, width))
     for top in range(start, start + height, rows):
         yield slice(top, min(top + rows, start + height))
+
+
+def strips(height: int, width: int) -> Iterator[tuple[int, int]]:
+    """(top, bottom) of strips of rows that are worth one step of array work, and small beside the picture."""
+    rows = max(1, 16 * BAND_PIXELS // width)
+    for top in range(0, height, rows):
+        yield top, min(height, top + rows)
 
 
 def as_mask(mask: ArrayLike | None, shape: tuple[int, int]) -> NDArray | None:

@@ -158,7 +158,10 @@ class _Job:
     ) -> None:
         self.picture, self.regions, self.columns, self.out = picture, regions, columns, out
         self.curve, self.dtype = curve, dtype
-        self.integer = dtype.kind == "u"
+        self.integer, self.floats = dtype.kind == "u", picture.pixels.dtype.kind == "f"
+        # Linear float32 needs no encoding: the result is made where it belongs.
+        self.same_codes = dtype == picture.pixels.dtype and curve == picture.curve
+        self.direct = dtype == np.float32 and curve.is_linear and not np.shares_memory(out, picture.pixels)
         # A pixel times the transposed matrix, so that (n, 3) rows need no turning round.
         self.matrices = [np.ascontiguousarray(r.matrix.T, np.float32) for r in regions]
         self.changes = [np.ascontiguousarray((r.matrix - np.eye(3)).T, np.float32) for r in regions]
@@ -176,58 +179,53 @@ class _Job:
         encoder = transfer.Encoder(self.curve, self.dtype)
         for rows in parts:
             n = (rows.stop - rows.start) * width
-            stored = self.picture.pixels[rows, self.columns, :3].reshape(n, 3)
-            linear = decoder.into(stored, scratch[:n])
-            result, covered = self._apply(rows, linear, product[:n])
-            if covered == 0 and result is linear and self.dtype == stored.dtype and self.curve == self.picture.curve:
-                self.out[rows, self.columns, :3] = stored.reshape(rows.stop - rows.start, width, 3)
+            stored = self.picture.pixels[rows, self.columns, :3]
+            target = self.out[rows, self.columns, :3]
+            weights = [self._weights(region, rows) for region in self.regions]
+            if self.same_codes and all(w is not None and not w.any() for w in weights):
+                target[...] = stored
                 continue
-            inside += covered
-            if result is linear:  # perhaps the picture's own memory, and what follows overwrites
-                result = product[:n]
-                np.copyto(result, linear)
-            if not np.isfinite(np.vdot(result, result)):
+            linear = decoder.into(stored.reshape(n, 3), scratch[:n])
+            in_target = self.direct and target.flags.c_contiguous
+            result = target.reshape(n, 3) if in_target else product[:n]
+            inside += self._apply(rows, linear, weights, result)
+            if self.floats and not np.isfinite(np.vdot(result, result)):
                 _check_finite(result)
             if self.integer:
                 outside += gamut.fit_to_gamut(result)
-            encoder.into(result, self.out[rows, self.columns, :3])
+            if not in_target:
+                encoder.into(result, target)
         return inside, outside
 
     def _apply(
-        self, rows: slice, linear: NDArray[np.float32], product: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], int]:
-        """Recolor one band; returns (pixels, number inside regions). The result may be `linear` or `product`."""
-        if len(self.regions) == 1:
-            region = self.regions[0]
-            weights = self._weights(region, rows)
-            if weights is None:
-                return np.matmul(linear, self.matrices[0], out=product), len(linear)
-            low, high = float(weights.min()), float(weights.max())
-            if high == 0:
-                return linear, 0
-            if low == 1:
-                return np.matmul(linear, self.matrices[0], out=product), len(linear)
-        result = product
+        self,
+        rows: slice,
+        linear: NDArray[np.float32],
+        weights: list[NDArray[np.float32] | None],
+        result: NDArray[np.float32],
+    ) -> int:
+        """Recolor one band into `result`; returns the number of pixels inside regions."""
+        if len(weights) == 1 and (weights[0] is None or weights[0].min() == 1):
+            np.matmul(linear, self.matrices[0], out=result)
+            return len(linear)
         np.copyto(result, linear)
-        room: NDArray | float = 1.0
-        covered: NDArray | None = None
+        room = np.ones(len(linear), np.float32)
         for k in reversed(range(len(self.regions))):
-            region = self.regions[k]
-            asked = self._weights(region, rows)
-            weights = np.ones(len(linear), np.float32) if asked is None else asked
-            granted = np.minimum(weights, room)
-            room = room - granted
+            edge, asked = self.regions[k].edge, weights[k]
+            if asked is None:
+                asked = np.ones(len(linear), np.float32)
+            granted = np.minimum(asked, room)
+            room -= granted
             change = linear @ self.changes[k]
             change *= granted[:, None]
-            if region.edge is not None:
-                part = region.edge.within(rows)
+            if edge is not None:
+                part = edge.within(rows)
                 width = self.columns.stop - self.columns.start
-                at = (region.edge.rows[part] - rows.start) * width + region.edge.columns[part] - self.columns.start
-                scale = granted[at] / np.maximum(weights[at], 1e-6)
-                change[at] = (region.edge.share[part] @ self.changes[k]) * scale[:, None]
+                at = (edge.rows[part] - rows.start) * width + edge.columns[part] - self.columns.start
+                scale = granted[at] / np.maximum(asked[at], 1e-6)
+                change[at] = (edge.share[part] @ self.changes[k]) * scale[:, None]
             result += change
-            covered = granted > 0 if covered is None else covered | (granted > 0)
-        return result, int(np.count_nonzero(covered))
+        return int(np.count_nonzero(room < 1))
 
     def _weights(self, region: RegionMatrix, rows: slice) -> NDArray[np.float32] | None:
         if region.mask is None:

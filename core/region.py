@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .compositing import box_sum
 from .errors import MaskError
-from .picture import Picture, as_weights
+from .neighborhood import dilate, erode, mean_nearby
+from .picture import Picture, strips
 from .reference import DARK, _plane, check_pixel, read_window, trimmed_mean
 
 # Pixels of the reduced picture on which the region is grown.
-_WORKING_PIXELS = 600_000
+_WORKING_PIXELS = 300_000
 
 # Half the step of 8-bit sRGB codes near black, in linear light.
 _DARK_STEP = 1.5e-4
@@ -87,16 +87,16 @@ def region_at(
     w = np.ones(3) if white is None else np.asarray(white, np.float64)
     height, width = picture.shape
     step = max(1, int(np.ceil(np.sqrt(height * width / _WORKING_PIXELS))))
-    small = shrink(picture, step) / w
+    small = shrink(picture, step)
     body = trimmed_mean(read_window(picture, (x, y))) / w
     if body.max() < DARK / 4:
         raise MaskError(f"Click ({x}, {y}) is on black: click a lit part of the product.")
     start = min(y // step, small.shape[0] - 1), min(x // step, small.shape[1] - 1)
-    grower = _Grower(small, w, start, picture.clip_level)
+    grower = _Grower(small / w.astype(np.float32), w, start, picture.clip_level)
     own = _STRICT
     for _ in range(2):
         body, own = grower.learn(grower.grow(body, _times(own, tolerance)), body)
-    return _soft_edge(picture, grower.grow(body, _times(own, tolerance)), step)
+    return _soft_edge(picture, small, grower.grow(body, _times(own, tolerance)), step)
 
 
 def _times(t: _Tolerance, factor: float) -> _Tolerance:
@@ -111,8 +111,8 @@ def shrink(picture: Picture, step: int) -> NDArray[np.float32]:
     rows, columns = height // step, width // step
     out = np.empty((rows, columns, 3), np.float32)
     for k in range(rows):
-        block = picture.linear(slice(k * step, (k + 1) * step), slice(0, columns * step))
-        out[k] = block.reshape(step, columns, step, 3).mean(axis=(0, 2))
+        block = picture.linear(slice(k * step, (k + 1) * step), slice(0, columns * step)).sum(axis=0)
+        out[k] = block.reshape(columns, step, 3).sum(axis=1) / np.float32(step * step)
     return out
 
 
@@ -242,9 +242,9 @@ _JUMPS = ((0.01, 0.0005), (0.022, 0.003), (0.04, 0.05))
 def _connected(similar: NDArray, start: tuple[int, int]) -> NDArray[np.bool_]:
     """Parts of `similar` that hang together with `start`, over narrow gaps too."""
     # Parts joined by a thread of mixed pixels only are not one: they are told apart by their kernels.
-    kernel = box_sum(similar, 1) > 8.5
+    kernel = erode(similar, 1)
     if not kernel[start]:
-        kernel |= (box_sum(_only(start, similar.shape), 2) > 0.5) & similar
+        kernel |= dilate(_only(start, similar.shape), 2) & similar
     labels, count = label(kernel)
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
     chosen = np.zeros(count + 1, bool)
@@ -254,13 +254,13 @@ def _connected(similar: NDArray, start: tuple[int, int]) -> NDArray[np.bool_]:
         total = np.count_nonzero(inside)
         added = False
         for reach, least in _JUMPS:
-            near = box_sum(inside, max(2, round(reach * max(similar.shape)))) > 0.5
+            near = dilate(inside, max(2, round(reach * max(similar.shape))))
             reached = np.unique(labels[near])
             new = reached[(reached > 0) & ~chosen[reached] & (sizes[reached] >= max(12, least * total))]
             chosen[new] = True
             added |= len(new) > 0
         if not added:
-            return (box_sum(inside, 2) > 0.5) & similar
+            return dilate(inside, 2) & similar
 
 
 def _only(position: tuple[int, int], shape: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -286,51 +286,36 @@ def _surrounded(rest: NDArray, core: NDArray, most: float) -> NDArray[np.bool_]:
     return keep[labels]
 
 
-def _soft_edge(picture: Picture, grown: NDArray[np.bool_], step: int) -> NDArray[np.uint8]:
-    """Full-size coverage: along the outline, each pixel is unmixed between the colors on its two sides."""
+def _soft_edge(picture: Picture, small: NDArray, grown: NDArray[np.bool_], step: int) -> NDArray[np.uint8]:
+    """Full-size coverage: along the outline, each pixel is unmixed between the colors on its two sides.
+
+    The pure colors of the two sides are taken on the reduced picture, `small`; the pixels are those of the photo.
+    """
     height, width = picture.shape
-    full = np.zeros((height, width), np.uint8)
-    big = np.repeat(np.repeat(grown, step, axis=0), step, axis=1)
-    full[: big.shape[0], : big.shape[1]] = big[:height, :width] * np.uint8(255)
-    if big.shape[0] < height:
-        full[big.shape[0] :] = full[big.shape[0] - 1]
-    if big.shape[1] < width:
-        full[:, big.shape[1] :] = full[:, big.shape[1] - 1 : big.shape[1]]
-    reach = step + 1  # half width of the band in which the outline may truly lie
-    look = reach + 3 + step  # how far to look for pure colors
-    result = full.copy()
-    strip = max(1, 16 * 24_000 // width)
-    for top in range(0, height, strip):
-        bottom = min(height, top + strip)
-        first, last = max(0, top - look - reach), min(height, bottom + look + reach)
-        inside = full[first:last] > 0
-        if inside.all() or not inside.any():
-            continue
-        near_in = box_sum(inside, reach)
-        near_all = box_sum(np.ones_like(inside), reach)
-        band = (near_in > 0.5) & (near_in < near_all - 0.5)
-        own = band[top - first : bottom - first]
-        if not own.any():
-            continue
-        linear = picture.linear(slice(first, last))
-        means = []
-        for pure in (inside & ~band, ~inside & ~band):
-            count = box_sum(pure, look)[..., None]
-            light = box_sum(linear * pure[..., None], look)
-            means.append((light / np.maximum(count, 1), count[..., 0] > 0.5))
-        (product, has_product), (behind, has_behind) = means
-        across = product - behind
-        length = np.einsum("ijk,ijk->ij", across, across)
-        share = np.einsum("ijk,ijk->ij", linear - behind, across) / np.maximum(length, 1e-12)
-        known = has_product & has_behind & (length > 1e-6)
-        cover = np.where(known, np.clip(share, 0, 1), inside)
-        # Nearly pure pixels are pure: noise is not transparency.
-        cover = np.clip((cover - 0.08) / 0.84, 0, 1)
-        part = result[top:bottom]
-        part[own] = np.round(cover[top - first : bottom - first][own] * 255).astype(np.uint8)
+    rows = np.minimum(np.arange(height) // step, grown.shape[0] - 1)
+    columns = np.minimum(np.arange(width) // step, grown.shape[1] - 1)
+    reach = 2 if step == 1 else 1  # half width of the band in which the outline may truly lie
+    band = dilate(grown, reach) & ~erode(grown, reach)
+    y, x = np.nonzero(band)
+    reduced = Picture(small)
+    product, has_product = mean_nearby(reduced, grown & ~band, y, x, 2 * reach + 3)
+    behind, has_behind = mean_nearby(reduced, ~grown & ~band, y, x, 2 * reach + 3)
+    across = product - behind
+    length = np.einsum("ij,ij->i", across, across)
+    known = has_product & has_behind & (length > 1e-6)
+    across /= np.maximum(length, 1e-12)[:, None]
+    cell = np.full(grown.shape, -1, np.int32)
+    cell[y, x] = np.where(known, np.arange(len(y)), -1)
+
+    result = np.empty((height, width), np.uint8)
+    for top, bottom in strips(height, width):
+        part = grown[np.ix_(rows[top:bottom], columns)].astype(np.uint8) * np.uint8(255)
+        own = cell[np.ix_(rows[top:bottom], columns)]
+        y, x = np.nonzero(own >= 0)
+        if len(y):
+            k = own[y, x]
+            cover = np.einsum("ij,ij->i", picture.at(y + top, x) - behind[k], across[k])
+            # Nearly pure pixels are pure: noise is not transparency.
+            part[y, x] = np.round(np.clip((cover - 0.08) / 0.84, 0, 1) * 255)
+        result[top:bottom] = part
     return result
-
-
-def coverage(mask: NDArray) -> float:
-    """Share of the picture that a checked mask covers, 0..1."""
-    return float(as_weights(mask).mean(dtype=np.float64))
