@@ -36,7 +36,7 @@ def test_picture(height: int, width: int) -> NDArray[np.float32]:
     shade = np.clip(0.55 + 0.4 * np.sin(9 * x + 3 * np.sin(5 * y)) * np.cos(6 * y), 0.03, 1)
     gloss = np.maximum(np.sin(23 * x) * np.sin(17 * y), 0) ** 24 * 0.5
     inside = ((x - 0.5) / 0.38) ** 2 + ((y - 0.5) / 0.42) ** 2 < 1
-    body = np.where(inside[..., None], np.float32([0.62, 0.13, 0.05]), np.float32([0.42, 0.42, 0.42]))
+    body = np.where(inside[..., None], np.array([0.62, 0.13, 0.05], np.float32), np.float32(0.42))
     linear = shade[..., None] * body + (gloss * inside)[..., None]
     linear += rng.standard_normal(linear.shape, dtype=np.float32) * np.sqrt(linear * 1.5e-4 + 2e-6)
     return np.clip(linear, 0.0005, 0.98).astype(np.float32)
@@ -154,12 +154,16 @@ def in_files(table: Table, folder: Path, linear: NDArray[np.float32], rounds: in
 
         def copy(source: Path = source, plain: Path = plain, spec: oiio.ImageSpec = spec) -> None:
             reader = oiio.ImageInput.open(str(source))
+            if reader is None:
+                raise RuntimeError(oiio.geterror())
             pixels = reader.read_image(reader.spec().format)
             reader.close()
-            encode(pixels, plain, spec)
+            encode(np.asarray(pixels), plain, spec)
 
         def encode(pixels: NDArray, plain: Path, spec: oiio.ImageSpec) -> None:
             writer = oiio.ImageOutput.create(str(plain))
+            if writer is None:
+                raise RuntimeError(oiio.geterror())
             if not (writer.open(str(plain), spec) and writer.write_image(pixels) and writer.close()):
                 raise RuntimeError(writer.geterror())
 

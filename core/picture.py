@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,12 +88,12 @@ class Picture:
             return self.linear()[inside].reshape(-1, 3)
         return self.linear(slice(step // 2, None, step), slice(step // 2, None, step))[grid]
 
-    @property
+    @cached_property
     def clip_level(self) -> float:
         """Linear value from which a channel counts as clipped; infinite for scene-linear floats without a top."""
         if self.pixels.dtype.kind == "u":
             return 1.0 - 1e-6
-        top = float(self.sample(1_000_000).max())
+        top = float(self.sample(250_000).max())
         return 1.0 - 1e-6 if 1.0 - 1e-6 <= top <= 1.0 + 1e-6 else np.inf
 
 
