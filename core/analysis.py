@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import dichromatic, stability
 from . import recolor as recoloring
 from .compositing import Edge, unmix_edge
-from .errors import ImageError, ReferenceColorError
+from .errors import ImageError, ReferenceColorError, WhiteError
 from .picture import Picture, as_mask, as_weights
 from .reference import DARK, Reference, matte_reference, reference_at
 
@@ -235,6 +235,11 @@ def analyze(
     w = dichromatic.as_white(white)
     m = as_mask(mask, picture.shape)
     found = _find_reference(picture, reference, w, m)
+    if white is not None and model != "body" and np.allclose(found.color, w, rtol=1e-6, atol=0):
+        raise WhiteError(
+            "The white and the reference are the same color: pick the product for the reference, and a white or grey "
+            "card for the white."
+        )
     gain = stability.noise_gain(found.color, w)
     warnings = []
     chosen = model

@@ -198,8 +198,9 @@ def prepare(
     if recipe.white == "highlights":
         white, confidence = white_from_highlights(picture, light_colors(space), masks[0])
         source = f"highlights (confidence {confidence:.0%})"
+    given = recipe.white is not None or photo_white is not None
     analyses = tuple(
-        analyze(picture, white, region.reference, mask, region.model)
+        analyze(picture, white if given else None, region.reference, mask, region.model)
         for region, mask in zip(recipe.regions, masks, strict=True)
     )
     return Prepared(recipe, space, white, _target_white(recipe, space, white), analyses, source)

@@ -323,7 +323,8 @@ def white_from_highlights(
             "The highlights do not point to the color of any usual light: pick a white card or name the light."
         )
     flat = 1 - min(1.0, float(strength[1] / strength[0]) * 2)
-    # A plane that runs along the locus cuts it nowhere in particular.
-    near = off < off[best] + 0.01
-    sharp = 1 - np.count_nonzero(near) / len(locus)
+    # A plane that runs along the locus cuts it nowhere in particular: how far apart are lights that fit as well?
+    near = lights[off < off[best] + 0.02]
+    spread = np.degrees(np.arccos(np.clip(near @ near.T, -1, 1))).max()
+    sharp = 1 - min(1.0, float(spread) / 25)
     return locus[best].astype(np.float64), float(np.clip(flat * sharp, 0, 1))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .dichromatic import sine
 from .errors import MaskError
 from .neighborhood import dilate, erode, mean_nearby
 from .picture import Picture, strips
@@ -47,8 +48,22 @@ _LEAST = _Tolerance(1.8, 4.5, 4.5)
 _MOST = _Tolerance(4.0, 14.0, 10.0)
 _MOST_TILT = 0.4
 
+# Within this angle of the white, in degrees, a product is almost grey, and steps of brightness of this size (natural
+# logarithm, from pixel to pixel) bound it.
+_PALE = 9.0
+_STEP = 0.12
+
+# Around a click, in pixels of the reduced picture, colors may differ by this angle before they count as texture.
+_NEAR = 7
+_TEXTURED = 6.0
+
 # How far highlights may leave the plane, as a slope: lights differ a little, and clipping bends them.
 _GLOSS_SLOPE = 0.18
+
+# How far sheen may go toward the white, as a slope, and how little the color may change, from one pixel to the next,
+# where a large highlight or fold passes over to the body: as a share of the lighter pixel.
+_SHEEN_SLOPE = 0.5
+_SMOOTH = 0.2
 
 # How far folds may leave it.
 _FOLD_SLOPE = 0.21
@@ -92,11 +107,56 @@ def region_at(
     if body.max() < DARK / 4:
         raise MaskError(f"Click ({x}, {y}) is on black: click a lit part of the product.")
     start = min(y // step, small.shape[0] - 1), min(x // step, small.shape[1] - 1)
-    grower = _Grower(small / w.astype(np.float32), w, start, picture.clip_level)
+    balanced, body, blurred = _calm(small / w.astype(np.float32), body, start)
+    grower = _Grower(balanced, w, start, picture.clip_level)
     own = _STRICT
     for _ in range(2):
         body, own = grower.learn(grower.grow(body, _times(own, tolerance)), body)
-    return _soft_edge(picture, small, grower.grow(body, _times(own, tolerance)), step)
+    grown = grower.grow(body, _times(own, tolerance))
+    return _hard_edge(picture.shape, grown, step) if blurred else _soft_edge(picture, small, grown, step)
+
+
+def _calm(balanced: NDArray, body: NDArray, start: tuple[int, int]) -> tuple[NDArray, NDArray, bool]:
+    """Blur a picture until the texture around the click has one color.
+
+    A heather or a coarse weave has no single body color from pixel to pixel; its mean over a few yarns has.
+
+    Returns
+    -------
+    The picture, the body color in it, and whether it was blurred at all.
+    """
+    y, x = start
+    calm = balanced
+    for radius in (0, 1, 2, 4, 7):
+        if radius:
+            calm = _box_mean(balanced, radius)
+        near = calm[max(0, y - _NEAR) : y + _NEAR + 1, max(0, x - _NEAR) : x + _NEAR + 1].reshape(-1, 3)
+        if radius:
+            body = trimmed_mean(near)
+        size = np.linalg.norm(near, axis=1)
+        cosine = near @ (body / np.linalg.norm(body)) / np.maximum(size, 1e-6)
+        apart = np.degrees(np.arccos(np.clip(cosine[size > 0.2 * np.linalg.norm(body)], -1, 1)))
+        if len(apart) == 0 or np.quantile(apart, 0.84) <= _TEXTURED:
+            return calm, body, radius > 0
+    return calm, body, True
+
+
+def _box_mean(values: NDArray, radius: int) -> NDArray[np.float32]:
+    """Mean over the (2 radius + 1) square around every pixel of (h, w, 3); the border is repeated."""
+    out = values.astype(np.float64)
+    for axis in (0, 1):
+        pads = [(radius + 1, radius) if k == axis else (0, 0) for k in range(3)]
+        total = np.cumsum(np.pad(out, pads, mode="edge"), axis=axis)
+        ahead = tuple(slice(2 * radius + 1, None) if k == axis else slice(None) for k in range(3))
+        behind = tuple(slice(None, -2 * radius - 1) if k == axis else slice(None) for k in range(3))
+        out = (total[ahead] - total[behind]) / (2 * radius + 1)
+    return out.astype(np.float32)
+
+
+def _hard_edge(shape: tuple[int, int], grown: NDArray[np.bool_], step: int) -> NDArray[np.uint8]:
+    rows = np.minimum(np.arange(shape[0]) // step, grown.shape[0] - 1)
+    columns = np.minimum(np.arange(shape[1]) // step, grown.shape[1] - 1)
+    return grown[np.ix_(rows, columns)].astype(np.uint8) * np.uint8(255)
 
 
 def _times(t: _Tolerance, factor: float) -> _Tolerance:
@@ -142,10 +202,15 @@ class _Grower:
         # The step of an 8-bit code near black turns the color of dark pixels, most where the white is low.
         normal, toward = _plane(body)
         blur, blur_toward = (3 * _DARK_STEP * float(np.linalg.norm(axis / self.white)) for axis in (normal, toward))
-        slope = np.tan(np.radians(np.minimum([tolerance.out, tolerance.toward, tolerance.away], 80)))
+        # Toward the white no further than half way: there begins what is grey.
+        to_white = float(np.degrees(np.arcsin(sine(body))))
+        limits = [tolerance.out, min(tolerance.toward, 0.5 * to_white), tolerance.away]
+        slope = np.tan(np.radians(np.minimum(limits, 80)))
         lit = along > max(0.01 * float(np.linalg.norm(body)), DARK / 4)
         similar = lit & (np.abs(out) <= slope[0] * safe + blur)
         similar &= (paler <= slope[1] * safe + blur_toward) & (-paler <= slope[2] * safe + blur_toward)
+        if to_white < _PALE:
+            similar &= ~self._steps()
         similar[self.start] = True
         core = _connected(similar, self.start)
         # What the material surrounds: gloss near the plane, clipped pixels, shadow too dark to have a color, folds.
@@ -153,11 +218,30 @@ class _Grower:
         glossy = (np.minimum(np.abs(out), np.abs(untilted)) <= _GLOSS_SLOPE * size + blur) & (along > 0)
         # Deep folds: light that met the material twice is darker, more colored and turned in hue.
         folded = (along < 0.7 * float(np.linalg.norm(body))) & (paler < 0) & (np.abs(out) <= _FOLD_SLOPE * safe + blur)
-        most = 0.02 * np.count_nonzero(core)
+        sheen_slope = min(_SHEEN_SLOPE, float(np.tan(np.radians(0.7 * to_white))))
+        # Sheen at grazing angles: the same plane, further toward the white.
+        sheen = lit & (np.abs(out) <= slope[0] * safe + blur) & (paler <= sheen_slope * safe) & (paler > 0)
+        total = np.count_nonzero(core)
         found = core.copy()
-        for kind in (glossy | self.clipped, folded | ~lit):
-            found |= _surrounded(kind & ~core, core, most)
+        for kind in (sheen, glossy | self.clipped, folded | ~lit):
+            found |= _surrounded(kind & ~found, found, self.balanced, 0.03 * total, 0.2 * total)
         return found
+
+    def _steps(self) -> NDArray[np.bool_]:
+        """Where brightness jumps: for a product almost the color of the light this is all that bounds it."""
+        light = np.log(np.maximum(self.balanced.sum(axis=-1), 3 * DARK))
+        y, x = self.start
+        near = light[max(0, y - _NEAR) : y + _NEAR + 1, max(0, x - _NEAR) : x + _NEAR + 1]
+        usual = [np.abs(np.diff(near, axis=k)).ravel() for k in (0, 1)]
+        # A weave has steps of its own; only larger ones bound it.
+        least = max(_STEP, 2.5 * float(np.quantile(np.concatenate([*usual, [0.0]]), 0.9)))
+        down, across = np.abs(np.diff(light, axis=0)) > least, np.abs(np.diff(light, axis=1)) > least
+        steps = np.zeros(light.shape, bool)
+        steps[:-1] |= down
+        steps[1:] |= down
+        steps[:, :-1] |= across
+        steps[:, 1:] |= across
+        return steps
 
     def learn(self, inside: NDArray, body: NDArray) -> tuple[NDArray, _Tolerance]:
         """Body color and tolerance of the material, from what a strict growth found."""
@@ -269,19 +353,29 @@ def _only(position: tuple[int, int], shape: tuple[int, ...]) -> NDArray[np.bool_
     return mask
 
 
-def _surrounded(rest: NDArray, core: NDArray, most: float) -> NDArray[np.bool_]:
-    """Parts of `rest`, of up to `most` pixels, whose outline lies mostly against `core`."""
+def _surrounded(rest: NDArray, core: NDArray, balanced: NDArray, small: float, large: float) -> NDArray[np.bool_]:
+    """Parts of `rest` whose outline lies mostly against `core`.
+
+    Parts of up to `small` pixels as they are; of up to `large` pixels if the color passes over to the core smoothly,
+    as highlights and folds do, and things that lie before the product do not.
+    """
     labels, count = label(rest)
-    against, outline = np.zeros(count + 1), np.zeros(count + 1)
+    against, outline, jump = np.zeros(count + 1), np.zeros(count + 1), np.zeros(count + 1)
     for axis in (0, 1):
-        for sign in (1, -1):
-            beside = np.roll(core, sign, axis)
-            other = np.roll(labels, sign, axis)
-            edge = (labels > 0) & (other != labels)
-            outline += np.bincount(labels[edge], minlength=count + 1)
-            against += np.bincount(labels[edge & beside], minlength=count + 1)
+        low = tuple(slice(None, -1) if k == axis else slice(None) for k in (0, 1))
+        high = tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))
+        for one, other in ((low, high), (high, low)):
+            edge = (labels[one] > 0) & (labels[other] != labels[one])
+            touching = edge & core[other]
+            names = labels[one][touching]
+            a, b = balanced[one][touching], balanced[other][touching]
+            differ = np.linalg.norm(a - b, axis=1) / np.maximum(np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1))
+            outline += np.bincount(labels[one][edge], minlength=count + 1)
+            against += np.bincount(names, minlength=count + 1)
+            jump += np.bincount(names, np.nan_to_num(differ), minlength=count + 1)
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
-    keep = (against > 0.45 * np.maximum(outline, 1)) & (sizes <= most)
+    smooth = jump < _SMOOTH * np.maximum(against, 1)
+    keep = (against > 0.45 * np.maximum(outline, 1)) & ((sizes <= small) | (smooth & (sizes <= large)))
     keep[0] = False
     return keep[labels]
 
