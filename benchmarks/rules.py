@@ -1,6 +1,6 @@
 """The two rules of the core that were found by measurement, on renders of products truly in another color.
 
-    uv run --group blender python -m dyehouse.benchmarks.rules [--size 160]
+    uv run python -m dyehouse.benchmarks.rules [--size 160]
 
 1. How much of the residual to carry over, against the distance of the target: `dichromatic.carried_residual`.
 2. From which noise gain on "auto" leaves the dichromatic model: `analysis.LARGEST_NOISE_GAIN`.
@@ -153,7 +153,7 @@ def main() -> None:
         [
             "# Two rules and what they were found from",
             "",
-            "Made by `uv run --group blender python -m dyehouse.benchmarks.rules`. Every figure compares a recolored",
+            "Made by `uv run python -m dyehouse.benchmarks.rules`. Every figure compares a recolored",
             'render with a render of the object truly in the target color, over the object\'s interior. "8-bit" is the',
             "source with the noise of a camera and in 8-bit codes; the truth is always noise-free.",
             "",
