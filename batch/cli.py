@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -134,7 +135,7 @@ def _numbers(text: str, what: str, counts: tuple[int, ...]) -> tuple[float, ...]
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
         values = ()
-    if len(values) not in counts:
+    if len(values) not in counts or not all(math.isfinite(v) for v in values):
         forms = " or ".join({2: "x,y", 3: "r,g,b"}[n] for n in counts)
         raise RecipeError(
             f"{what} '{text}' is not understood: give {forms}, such as {'640,480' if 2 in counts else '1,1,1'}."
@@ -146,7 +147,7 @@ def _pixel(text: str | None, what: str) -> tuple[int, int] | None:
     if text is None:
         return None
     x, y = _numbers(text, what, (2,))
-    return int(x), int(y)
+    return math.floor(x), math.floor(y)
 
 
 def _light(text: str | None) -> str | tuple[float, ...] | None:

@@ -43,6 +43,7 @@ def recolored(
     swatches: Sequence[Swatch | None] | None = None,
     *,
     reuse: bool = False,
+    out: NDArray | None = None,
     threads: int | None = None,
 ) -> tuple[NDArray, Shares]:
     """Pixels of the recolored photo as the output file wants them.
@@ -57,6 +58,8 @@ def recolored(
         Targets of this colorway, one for each region; None for the recipe's own.
     reuse
         Overwrite the photo's pixels if they have the right kind, to save memory; the photo is then spent.
+    out
+        Array of an earlier colorway of the same photo and kind of output, to be overwritten.
     threads
         None for one per core.
 
@@ -78,7 +81,8 @@ def recolored(
         regions = [type(r)(r.matrix, r.mask) for r in regions]  # edges were unmixed in premultiplied light
         analyzed = Picture(straight)
     same = dtype == photo.pixels.dtype and space.curve == photo.space.curve
-    out = photo.pixels if reuse and same else np.empty((height, width, channels), dtype)
+    if out is None:
+        out = photo.pixels if reuse and same else np.empty((height, width, channels), dtype)
     _, shares = recolor(analyzed, regions, curve=space.curve, dtype=dtype, out=out, threads=threads)
     if channels == 4 and out is not photo.pixels:
         out[..., 3] = converted(photo.pixels[..., 3], dtype)

@@ -1,4 +1,4 @@
-"""Speed and memory on this machine: `uv run --group bench python -m dyehouse.benchmarks.speed`.
+"""Speed and memory on this machine: `uv run --group bench python -m dyehouse.benchmarks.speed`; writes docs/speed.md.
 
 Every figure is a ratio to a plain baseline measured beside it in the same run, round by round, so that the noise of the
 machine falls on both. The table shows medians, and the smallest and largest ratio that was seen.
@@ -24,6 +24,7 @@ from ..core.colorspace import LINEAR_SRGB, SRGB
 from ..core.recipe import Prepared, Recipe, Region
 from ..core.swatches import parse_target
 
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "speed.md"
 _TARGET = "#1F4E79"
 _OTHERS = ("#2E7D4F", "#D9A820", "#8E2C6B")
 
@@ -152,6 +153,8 @@ def in_files(table: Table, folder: Path, linear: NDArray[np.float32], rounds: in
         opened, prepared = _prepared(source)
         spec = files._output_spec(opened.pixels, files._kind(output), output, opened, 95, None)
 
+        room = np.empty_like(opened.pixels)
+
         def copy(source: Path = source, plain: Path = plain, spec: oiio.ImageSpec = spec) -> None:
             reader = oiio.ImageInput.open(str(source))
             if reader is None:
@@ -170,8 +173,10 @@ def in_files(table: Table, folder: Path, linear: NDArray[np.float32], rounds: in
         def first(source: Path = source, output: Path = output) -> None:
             _recolor_file(source, output)
 
-        def further(output: Path = output, opened: files.Photo = opened, prepared: Prepared = prepared) -> None:
-            pixels, _ = photo.recolored(opened, prepared, output, [parse_target(_OTHERS[0])])
+        def further(
+            output: Path = output, opened: files.Photo = opened, prepared: Prepared = prepared, room: NDArray = room
+        ) -> None:
+            pixels, _ = photo.recolored(opened, prepared, output, [parse_target(_OTHERS[0])], out=room)
             files.write(output, pixels, opened, force=True)
 
         def encode_only(plain: Path = plain, opened: files.Photo = opened, spec: oiio.ImageSpec = spec) -> None:
@@ -207,8 +212,8 @@ def _process(arguments: list[str]) -> tuple[float, float]:
     return seconds, int(done.stdout.rsplit(maxsplit=1)[1]) / 1024
 
 
-def processes(table: Table, folder: Path, rounds: int, width: int) -> None:
-    """(e) memory of 8-bit files, and the times of whole processes."""
+def processes(table: Table, folder: Path, rounds: int, width: int) -> list[str]:
+    """(e) memory of 8-bit files, as lines of a table, and the times of whole processes."""
     options = ["--reference", f"{width // 2},300", "--target", _TARGET, "--force"]
     one = folder / "one.png"
     codes = transfer.encode(test_picture(1000, 1000), SRGB.curve, np.uint8)
@@ -230,7 +235,7 @@ def processes(table: Table, folder: Path, rounds: int, width: int) -> None:
         runs.append(_process(small)[0])
     table.add("dyehouse --help, whole process", starts, None, "0.3 s")
     table.add("1 MP PNG, one click, whole process", runs, None, "1 s")
-    print("\nPeak resident memory of `dyehouse recolor`, 8-bit:")
+    lines = ["| file | peak resident memory | of which the decoded picture |", "|---|---|---|"]
     for suffix in ("jpg", "png"):
         for height in (2000, 4000, 8000):
             source = folder / f"tall-{height}.{suffix}"
@@ -239,11 +244,12 @@ def processes(table: Table, folder: Path, rounds: int, width: int) -> None:
             files.write(source, codes, files.Photo(source, codes, SRGB), force=True)
             _, peak = _process(["recolor", str(source), *options, "-o", str(folder / f"tall-out.{suffix}")])
             decoded = codes.nbytes / 2**20
-            print(f"  {suffix} {height * width / 1e6:.0f} MP: {peak:.0f} MB, of which {decoded:.0f} MB decoded picture")
+            lines.append(f"| {suffix}, {height * width / 1e6:.0f} MP | {peak:.0f} MB | {decoded:.0f} MB |")
+    return lines
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table and write the page."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--megapixels", type=float, default=24)
     options.add_argument("--rounds", type=int, default=7)
@@ -251,14 +257,32 @@ def main() -> None:
     width = round((given.megapixels * 1e6 * 1.5) ** 0.5)
     height = round(given.megapixels * 1e6 / width)
     linear = test_picture(height, width)
-    print(f"{width} x {height} pixels, {os.process_cpu_count()} cores, median of {given.rounds} rounds")
     table = Table()
     arrays(table, linear, given.rounds)
     with tempfile.TemporaryDirectory() as name:
         in_files(table, Path(name), linear, given.rounds)
-        processes(table, Path(name), min(5, given.rounds), width)
+        memory = processes(table, Path(name), min(5, given.rounds), width)
     rivals(table, np.ascontiguousarray(linear[: height // 2, : width // 2]), 3)
-    print(f"\n{table}")
+    page = "\n".join(
+        [
+            "# Speed and memory",
+            "",
+            "Made by `uv run --group bench python -m dyehouse.benchmarks.speed` on",
+            f"{os.process_cpu_count()} cores, with a picture of {width} x {height} pixels that has shading, gloss and",
+            "camera noise. Every ratio is to the baseline above it (d: to ours), taken round by round in one run:",
+            f"median of {given.rounds} rounds, smallest and largest",
+            "in parentheses. (a) and (b) are to be at most the bar; (c) is a share of the first colorway's whole time.",
+            "",
+            str(table),
+            "",
+            "Peak memory of `dyehouse recolor` as a process of its own:",
+            "",
+            *memory,
+            "",
+        ]
+    )
+    PAGE.write_text(page)
+    print(page)
 
 
 if __name__ == "__main__":

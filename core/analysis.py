@@ -149,8 +149,8 @@ class Analysis:
         """Estimate of the color error of a recolor, before it is made.
 
         Two parts, added as squares. What the model does not explain of a pixel may or may not belong to the new
-        color: the difference between carrying the residual over whole and dropping it. And the photo's noise, as
-        the recolor matrix multiplies it beyond what the photo has itself.
+        color: the difference between carrying the residual over whole and dropping it, which counts the more the
+        farther the target is. And the photo's noise, as the recolor matrix multiplies it beyond what the photo has.
 
         Parameters
         ----------
@@ -164,7 +164,9 @@ class Analysis:
         return stability.predicted_error(
             self.picture,
             self.matrix(target, target_white, "drop"),
-            self.matrix(target, target_white, "keep"),
+            self.matrix(
+                target, target_white, 1 - dichromatic.carried_residual(self.reference, target, self.white, target_white)
+            ),
             self.noise,
             self.white if target_white is None else dichromatic.as_white(target_white),
             self.mask,
@@ -234,7 +236,10 @@ def analyze(
     picture = Picture.of(image)
     w = dichromatic.as_white(white)
     m = as_mask(mask, picture.shape)
+    if reference is None:
+        _check_finite(picture)
     found = _find_reference(picture, reference, w, m)
+    _check_finite(picture)
     if white is not None and model != "body" and np.allclose(found.color, w, rtol=1e-6, atol=0):
         raise WhiteError(
             "The white and the reference are the same color: pick the product for the reference, and a white or grey "
@@ -261,14 +266,20 @@ def analyze(
     return Analysis(picture, w, found.color, found.pixel, m, chosen, gain, tuple(warnings))
 
 
+def _check_finite(picture: Picture) -> None:
+    if not np.isfinite(picture.overview).all():
+        raise ImageError("Picture has NaN or infinite pixels: repair them before recoloring.")
+
+
 def _find_reference(picture: Picture, reference: ArrayLike | None, white: NDArray, mask: NDArray | None) -> Reference:
     if reference is None:
         return matte_reference(picture, white, mask)
-    given = np.asarray(reference)
+    try:
+        given = np.asarray(reference)
+    except ValueError:
+        raise ReferenceColorError(f"Reference {reference!r} is not understood: give x, y or r, g, b.") from None
     if given.shape == (2,):
-        if given.dtype.kind not in "iuf" or not np.isfinite(given).all():
-            raise ReferenceColorError(f"Reference {reference!r} is not a pixel: give x and y as numbers.")
-        return reference_at(picture, (int(given[0]), int(given[1])), white, mask)
+        return reference_at(picture, given, white, mask)
     return Reference(dichromatic.as_reference(given))
 
 
@@ -281,9 +292,7 @@ def _warnings(picture: Picture, found: Reference, white: NDArray, mask: NDArray 
         )
     if (found.color / white).max() < 4 * DARK:
         said.append("The reference is dark, so its color is uncertain: click a better lit part.")
-    pixels = picture.sample(_SAMPLE // 4, mask)
-    if not np.isfinite(pixels).all():
-        raise ImageError("Picture has NaN or infinite pixels: repair or mask them before recoloring.")
+    pixels = picture.sample(_SAMPLE // 4, mask) if mask is not None else picture.overview
     clipped = float((pixels.max(axis=1) >= picture.clip_level).mean())
     if clipped > 0.01:
         said.append(

@@ -41,7 +41,7 @@ def fit_to_gamut(linear: NDArray[np.float32]) -> int:
     pixels = linear[outside]
     grey = np.clip(pixels @ _LUMINANCE, 0.0, 1.0)[:, None]
     away = pixels - grey
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         room = np.where(away > 0, (1 - grey) / away, np.where(away < 0, -grey / away, np.inf))
     linear[outside] = grey + np.minimum(room.min(axis=1), 1)[:, None] * away
     return len(outside)

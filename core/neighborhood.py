@@ -17,7 +17,8 @@ def dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
     for axis in (0, 1):
         reached = 0
         while reached < radius:
-            step = min(radius - reached, 2 * reached + 1)
+            # No further than what is reached already: past the border there is nothing to shift in.
+            step = min(radius - reached, reached + 1)
             grown = out.copy()
             ahead, behind = [slice(None)] * 2, [slice(None)] * 2
             ahead[axis], behind[axis] = slice(step, None), slice(None, -step)

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from . import transfer
 from .errors import ImageError, MaskError
 
-# Pixels in one band: small enough for the cache, and its product with a 3x3 matrix stays under the size from
-# which OpenBLAS spreads one product over threads, which is many times slower when the cores are busy.
-BAND_PIXELS = 24_000
+# Pixels in one band: its working arrays fit the second-level cache, and the calls for it are few.
+BAND_PIXELS = 48_000
 
 
 class Picture:
@@ -34,7 +33,10 @@ class Picture:
     """
 
     def __init__(self, pixels: ArrayLike, curve: transfer.Curve | None = None) -> None:
-        array = np.asarray(pixels)
+        try:
+            array = np.asarray(pixels)
+        except ValueError:
+            raise ImageError("Picture is ragged: give an array (height, width, 3), linear RGB.") from None
         if array.ndim != 3 or array.shape[2] < 3:
             raise ImageError(f"Picture has shape {array.shape}: give (height, width, 3), linear RGB.")
         if 0 in array.shape:
@@ -81,7 +83,9 @@ class Picture:
         if mask is None:
             step = _step(height * width, most)
             return self.linear(slice(step // 2, None, step), slice(step // 2, None, step)).reshape(-1, 3)
-        inside = as_weights(mask) > 0.95
+        weights = as_weights(mask)
+        # A mask that is soft all over is taken where it is strongest.
+        inside = weights > 0.95 * min(1.0, float(weights.max()))
         step = _step(int(np.count_nonzero(inside)), most)
         grid = inside[step // 2 :: step, step // 2 :: step]
         if not grid.any():
@@ -89,11 +93,16 @@ class Picture:
         return self.linear(slice(step // 2, None, step), slice(step // 2, None, step))[grid]
 
     @cached_property
+    def overview(self) -> NDArray[np.float32]:
+        """(n, 3) linear pixels from all over the picture."""
+        return self.sample(60_000)
+
+    @cached_property
     def clip_level(self) -> float:
         """Linear value from which a channel counts as clipped; infinite for scene-linear floats without a top."""
         if self.pixels.dtype.kind == "u":
             return 1.0 - 1e-6
-        top = float(self.sample(250_000).max())
+        top = float(self.overview.max())
         return 1.0 - 1e-6 if 1.0 - 1e-6 <= top <= 1.0 + 1e-6 else np.inf
 
 
@@ -110,9 +119,13 @@ def bands(height: int, width: int, start: int = 0) -> Iterator[slice]:
 
 def strips(height: int, width: int) -> Iterator[tuple[int, int]]:
     """(top, bottom) of strips of rows that are worth one step of array work, and small beside the picture."""
-    rows = max(1, 16 * BAND_PIXELS // width)
+    rows = max(1, 8 * BAND_PIXELS // width)
     for top in range(0, height, rows):
         yield top, min(height, top + rows)
+
+
+# A mask needs a pixel covered by more than this: codes of 0 and 1 are a mistake, not a mask.
+_LEAST_COVERAGE = 0.02
 
 
 def as_mask(mask: ArrayLike | None, shape: tuple[int, int]) -> NDArray | None:
@@ -132,18 +145,26 @@ def as_mask(mask: ArrayLike | None, shape: tuple[int, int]) -> NDArray | None:
     """
     if mask is None:
         return None
-    m = np.asarray(mask)
+    try:
+        m = np.asarray(mask)
+    except ValueError:
+        raise MaskError("Mask is ragged: give an array (height, width).") from None
     if m.dtype == bool:
         m = m.astype(np.uint8) * np.uint8(255)
-    if m.dtype.kind not in "fu":
+    if m.dtype.kind not in "fu" or (m.dtype.kind == "u" and m.dtype.itemsize > 2):
         raise MaskError(f"Mask has dtype {m.dtype}: give coverage as floats in 0..1, or bool.")
     if m.shape != shape:
         raise MaskError(
             f"Mask is {_size(m.shape)} and the picture is {_size(shape)}: give a mask of the picture's size."
         )
-    if m.dtype.kind == "f" and not (np.nanmin(m) >= -1e-6 and np.nanmax(m) <= 1 + 1e-6 and not np.isnan(m).any()):
+    # Written so that a NaN fails too.
+    if m.dtype.kind == "f" and not ((m >= -1e-6) & (m <= 1 + 1e-6)).all():
         raise MaskError("Mask has values outside 0..1: scale coverage so that 1 is fully selected.")
-    if not m.any():
+    if not as_weights(m).max() > _LEAST_COVERAGE:
+        if m.any():
+            raise MaskError(
+                "Mask selects next to nothing: its brightest pixel is almost black; make the product white."
+            )
         raise MaskError("Mask selects nothing: every pixel of it is 0, so there is no product to recolor.")
     return m
 

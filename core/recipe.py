@@ -188,6 +188,12 @@ def prepare(
     """
     if not recipe.regions:
         raise RecipeError("The recipe has no region: give at least one.")
+    for given, known, what in (
+        (recipe.adaptation, ("cat16", "bradford"), "Adaptation"),
+        (recipe.observer, ("1931", "1964"), "Observer"),
+    ):
+        if given not in known:
+            raise RecipeError(f"{what} '{given}' is not known: use {' or '.join(known)}.")
     for region in recipe.regions:
         if region.meaning not in MEANINGS:
             raise RecipeError(f"Meaning '{region.meaning}' is not known: use one of {', '.join(MEANINGS)}.")
@@ -198,9 +204,9 @@ def prepare(
     if recipe.white == "highlights":
         white, confidence = white_from_highlights(picture, light_colors(space), masks[0])
         source = f"highlights (confidence {confidence:.0%})"
-    given = recipe.white is not None or photo_white is not None
+    has_white = recipe.white is not None or photo_white is not None
     analyses = tuple(
-        analyze(picture, white if given else None, region.reference, mask, region.model)
+        analyze(picture, white if has_white else None, region.reference, mask, region.model)
         for region, mask in zip(recipe.regions, masks, strict=True)
     )
     return Prepared(recipe, space, white, _target_white(recipe, space, white), analyses, source)
@@ -228,8 +234,7 @@ def _white(
     if isinstance(asked, str):
         return colorimetry.illuminant_white(asked, space, recipe.observer, recipe.camera), f"illuminant {asked}"
     if len(asked) == 2:
-        x, y = int(asked[0]), int(asked[1])
-        return white_at(picture, (x, y), recipe.gray), f"pixel ({x}, {y})"
+        return white_at(picture, asked, recipe.gray), f"pixel ({asked[0]:.0f}, {asked[1]:.0f})"
     return as_white(asked), "given"
 
 
@@ -261,7 +266,7 @@ def _mask(
         click = region.click or region.reference
         if click is None or len(click) != 2:
             raise MaskError("A clicked region needs a pixel of the product: give the reference as x,y.")
-        return region_at(picture, (int(click[0]), int(click[1])), white, region.tolerance)
+        return region_at(picture, click, white, region.tolerance)
     if asked == "alpha":
         if alpha is None:
             raise MaskError("The photo has no alpha to take the mask from: give a mask file, or click the product.")

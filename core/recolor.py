@@ -20,6 +20,10 @@ from .compositing import Edge
 from .errors import ImageError
 from .picture import Picture, as_weights, bands
 
+# Pixels in one matrix product: under the size from which OpenBLAS spreads a product over threads, which is many
+# times slower when another process uses the cores.
+_PRODUCT_PIXELS = 24_000
+
 
 @dataclass(frozen=True, eq=False)
 class RegionMatrix:
@@ -194,7 +198,7 @@ class _Job:
             if self.integer:
                 outside += gamut.fit_to_gamut(result)
             if not in_target:
-                encoder.into(result, target)
+                encoder.into(result, target, scratch[:n].view(np.int32))
         return inside, outside
 
     def _apply(
@@ -206,7 +210,7 @@ class _Job:
     ) -> int:
         """Recolor one band into `result`; returns the number of pixels inside regions."""
         if len(weights) == 1 and (weights[0] is None or weights[0].min() == 1):
-            np.matmul(linear, self.matrices[0], out=result)
+            _product(linear, self.matrices[0], result)
             return len(linear)
         np.copyto(result, linear)
         room = np.ones(len(linear), np.float32)
@@ -216,7 +220,7 @@ class _Job:
                 asked = np.ones(len(linear), np.float32)
             granted = np.minimum(asked, room)
             room -= granted
-            change = linear @ self.changes[k]
+            change = _product(linear, self.changes[k], np.empty_like(linear))
             change *= granted[:, None]
             if edge is not None:
                 part = edge.within(rows)
@@ -233,7 +237,14 @@ class _Job:
         return as_weights(region.mask[rows, self.columns]).reshape(-1)
 
 
+def _product(pixels: NDArray[np.float32], matrix: NDArray[np.float32], out: NDArray[np.float32]) -> NDArray[np.float32]:
+    for start in range(0, len(pixels), _PRODUCT_PIXELS):
+        part = slice(start, start + _PRODUCT_PIXELS)
+        np.matmul(pixels[part], matrix, out=out[part])
+    return out
+
+
 def _check_finite(pixels: NDArray) -> None:
     bad = int(np.count_nonzero(~np.isfinite(pixels).all(axis=-1)))
     if bad:  # the sum of squares of huge ordinary numbers may overflow without one
-        raise ImageError("Picture has NaN or infinite pixels: repair or mask them before recoloring.")
+        raise ImageError("Picture has NaN or infinite pixels: repair them before recoloring.")

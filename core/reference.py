@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .dichromatic import sine
 from .errors import ReferenceColorError, WhiteError
@@ -42,15 +42,18 @@ class Reference:
     gloss: float = 0.0
 
 
-def check_pixel(picture: Picture, pixel: tuple[int, int], what: str) -> tuple[int, int]:
-    """(x, y) as whole numbers inside the picture.
+def check_pixel(picture: Picture, pixel: ArrayLike, what: str) -> tuple[int, int]:
+    """(x, y) as whole numbers inside the picture, from numbers of any kind; a fraction lies in its pixel.
 
     Raises
     ------
     ReferenceColorError
-        If it lies outside.
+        If it lies outside, or is not two numbers.
     """
-    x, y = int(pixel[0]), int(pixel[1])
+    position = np.asarray(pixel)
+    if position.shape != (2,) or position.dtype.kind not in "iuf" or not np.isfinite(position).all():
+        raise ReferenceColorError(f"{what} {pixel!r} is not a pixel: give x and y as numbers.")
+    x, y = (int(v) for v in np.floor(position))
     height, width = picture.shape
     if not (0 <= x < width and 0 <= y < height):
         raise ReferenceColorError(
@@ -84,7 +87,7 @@ def trimmed_mean(pixels: NDArray, keep: float = 0.6) -> NDArray[np.float64]:
     return pixels[nearest].mean(axis=0, dtype=np.float64)
 
 
-def reference_at(picture: Picture, pixel: tuple[int, int], white: NDArray, mask: NDArray | None = None) -> Reference:
+def reference_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray | None = None) -> Reference:
     """Read the reference color at a clicked pixel.
 
     Parameters
@@ -229,7 +232,7 @@ def _main_material(balanced: NDArray) -> NDArray[np.bool_]:
     return colored & (apart < np.radians(12))
 
 
-def white_at(picture: Picture, pixel: tuple[int, int], gray: float = 1.0) -> NDArray[np.float64]:
+def white_at(picture: Picture, pixel: ArrayLike, gray: float = 1.0) -> NDArray[np.float64]:
     """White of the light from a pixel of a white or grey card in the photo.
 
     Parameters
@@ -252,6 +255,8 @@ def white_at(picture: Picture, pixel: tuple[int, int], gray: float = 1.0) -> NDA
     """
     x, y = check_pixel(picture, pixel, "White pixel")
     color = trimmed_mean(read_window(picture, (x, y)))
+    if not np.isfinite(color).all():
+        raise WhiteError(f"White pixel ({x}, {y}) is not finite: pick an ordinary pixel of the card.")
     if color.max() >= picture.clip_level:
         raise WhiteError(
             f"White pixel ({x}, {y}) is clipped, so its color is lost: pick a darker part of the card, or a grey one."

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .dichromatic import sine
 from .errors import MaskError
@@ -70,7 +70,7 @@ _FOLD_SLOPE = 0.21
 
 
 def region_at(
-    picture: Picture, click: tuple[int, int], white: NDArray | None = None, tolerance: float = 1.0
+    picture: Picture, click: ArrayLike, white: NDArray | None = None, tolerance: float = 1.0
 ) -> NDArray[np.uint8]:
     """Select the material under a click.
 

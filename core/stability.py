@@ -98,7 +98,7 @@ def predicted_error(
     picture
         The photo.
     dropped, kept
-        (3, 3) recolor matrices that drop and that keep the residual.
+        (3, 3) recolor matrices that drop the residual, and that carry over as much of it as may be wrong.
     noise
         Noise of the photo.
     white
