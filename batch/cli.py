@@ -13,11 +13,10 @@ import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ..core.recipe import Prepared, Recipe
-    from ..core.recolor import Shares
     from . import files
 
 _EXAMPLES = """\
@@ -248,17 +247,23 @@ def _open(options: argparse.Namespace) -> tuple[files.Photo, Prepared]:
 
 def _recolor(options: argparse.Namespace) -> int:
     from ..core.errors import RecipeError
-    from . import files, photo
+    from . import files, inspection, photo
 
     if not 1 <= options.quality <= 100:
         raise RecipeError(f"Quality {options.quality} is not in 1..100: 95 is very good.")
     files.check_output(options.output, source=options.photo, force=options.force)
     opened, prepared = _open(options)
-    pixels, shares = photo.recolored(opened, prepared, options.output, reuse=True)
-    written = files.write(
-        options.output, pixels, opened, force=options.force, quality=options.quality, compression=options.compression
+    figures = inspection.report(opened, prepared)  # before the photo's pixels are used up
+    written, shares = photo.save(
+        opened,
+        prepared,
+        options.output,
+        force=options.force,
+        quality=options.quality,
+        compression=options.compression,
+        reuse=True,
     )
-    _tell(options, opened, prepared, shares, {"output": str(written)})
+    _tell(options, inspection.with_shares(figures, shares) | {"output": str(written)})
     return 0
 
 
@@ -274,10 +279,11 @@ def _inspect(options: argparse.Namespace) -> int:
         matrix = analysis.matrix(prepared.target(k), prepared.target_white, prepared.recipe.regions[k].residual)
         pixels += len(sample)
         outside += float(gamut.out_of_gamut(sample @ matrix.T).sum())
-    extra: dict[str, object] = {}
+    shares = Shares(pixels, outside / pixels if pixels else 0.0)
+    figures = inspection.with_shares(inspection.report(opened, prepared), shares)
     if options.maps:
-        extra["maps"] = [str(p) for p in inspection.write_maps(prepared, Path(options.maps), force=options.force)]
-    _tell(options, opened, prepared, Shares(pixels, outside / pixels if pixels else 0.0), extra)
+        figures["maps"] = [str(p) for p in inspection.write_maps(prepared, Path(options.maps), force=options.force)]
+    _tell(options, figures)
     return 0
 
 
@@ -290,20 +296,13 @@ def _demo(options: argparse.Namespace) -> int:
     return 0
 
 
-def _tell(
-    options: argparse.Namespace,
-    opened: files.Photo,
-    prepared: Prepared,
-    shares: Shares,
-    extra: dict[str, object],
-) -> None:
+def _tell(options: argparse.Namespace, figures: dict[str, Any]) -> None:
     from . import inspection
 
-    report = inspection.report(opened, prepared, shares) | extra
     if options.json:
-        print(json.dumps(report, indent=2))
-        return
-    print(inspection.in_words(report, brief=options.command == "recolor"))
+        print(json.dumps(figures, indent=2))
+    else:
+        print(inspection.in_words(figures, brief=options.command == "recolor"))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

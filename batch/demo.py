@@ -105,7 +105,7 @@ def run(folder: Path, *, quiet: bool = False) -> dict[str, Any]:
             pixels, shares = photo.recolored(opened, prepared, output, [swatch])
             written.append(files.write(output, pixels, opened, force=True))
             cells.append((f"{label}  {text}", np.ascontiguousarray(pixels[..., :3])))
-            reports[output.name] = inspection.report(opened, _asking(prepared, swatch), shares)
+            reports[output.name] = inspection.with_shares(inspection.report(opened, _asking(prepared, swatch)), shares)
         written += inspection.write_maps(prepared, folder, force=True, prefix=f"{subject.name}-")
         rows.append(cells)
         if not quiet:

@@ -5,10 +5,12 @@ OpenImageIO decodes and encodes the pixels; `metadata` carries everything else o
 
 from __future__ import annotations
 
+import collections
 import errno
 import os
 import secrets
 import shutil
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -577,6 +579,10 @@ def check_output(path: str | Path, *, source: str | Path | None = None, force: b
         raise FileError(f"'{path}' is the name of a camera RAW file, which cannot be written: use .tif or .png.")
     if path.suffix.lower() not in OUTPUT_KINDS:
         raise FileError(f"'{path}' does not end in a known extension: use one of {', '.join(OUTPUT_KINDS)}.")
+    try:
+        path.exists()
+    except OSError as error:
+        raise FileError(f"'{path.name[:40]}...' cannot be a file ({error.strerror}): choose another name.") from None
     if path.is_dir():
         raise FileError(f"'{path}' is a folder: give the name of a file.")
     folder = path.parent
@@ -651,6 +657,7 @@ def write(
     force: bool = False,
     quality: int = 95,
     compression: str | None = None,
+    rows: Iterable[int] | None = None,
 ) -> Path:
     """Write a picture with everything its source says besides the pixels.
 
@@ -672,6 +679,9 @@ def write(
         1 to 100, of JPEG and lossy WebP. A WebP made from a lossless WebP is lossless.
     compression
         Of TIFF or EXR, by OpenImageIO's name, such as ``zip``; None keeps the source's, or is lzw or zip.
+    rows
+        If `pixels` are still being made: how many rows from the top are done, growing to the height. They are
+        encoded as they come.
 
     Returns
     -------
@@ -692,13 +702,16 @@ def write(
         raise FileError(
             f"'{path}' would be {width} x {height} pixels, too large for a {kind.upper()}: write a PNG or TIFF."
         )
+    if rows is not None and not _fits(pixels, kind, path, photo):
+        collections.deque(rows, maxlen=0)
+        rows = None
     pixels = _fit(pixels, kind, path, photo)
     spec = _output_spec(pixels, kind, path, photo, quality, compression)
     blocks = _output_blocks(kind, path, photo)
     # The name is short and plain, so that it is possible wherever the file's own is.
     temporary = path.with_name(f".dyehouse-{secrets.token_hex(6)}{path.suffix}")
     try:
-        _encode(temporary, spec, pixels)
+        _encode(temporary, spec, pixels, rows)
         metadata.embed(temporary, blocks, kind, (width, height))
         if not force and path.exists():
             raise FileError(f"'{path}' exists already: choose another name or give --force.")
@@ -708,6 +721,12 @@ def write(
     finally:
         temporary.unlink(missing_ok=True)
     return path
+
+
+def _fits(pixels: NDArray, kind: str, path: Path, photo: Photo) -> bool:
+    """Tell whether `_fit` would leave the pixels as they are."""
+    straight_alpha = pixels.shape[2] == 4 and kind in ("jpeg", "tiff")
+    return pixels.dtype == output_dtype(path, photo) and pixels.flags.c_contiguous and not straight_alpha
 
 
 def _fit(pixels: NDArray, kind: str, path: Path, photo: Photo) -> NDArray:
@@ -853,14 +872,14 @@ def _output_blocks(kind: str, path: Path, photo: Photo) -> Blocks:
     return blocks
 
 
-def _encode(path: Path, spec: Any, pixels: NDArray) -> None:
+def _encode(path: Path, spec: Any, pixels: NDArray, rows: Iterable[int] | None) -> None:
     if path.suffix.lower() in (".jpg", ".jpeg", ".webp"):
-        _encode_in_memory(path, spec, pixels)
+        _encode_in_memory(path, spec, pixels, rows)
     else:
-        _write_image(path, str(path), spec, pixels)
+        _write_image(path, str(path), spec, pixels, rows)
 
 
-def _encode_in_memory(path: Path, spec: Any, pixels: NDArray) -> None:
+def _encode_in_memory(path: Path, spec: Any, pixels: NDArray, rows: Iterable[int] | None) -> None:
     """Encode where room does not end, and store the result.
 
     When a disk is full, libjpeg ends the whole process and OpenImageIO's WebP writer repeats itself forever, so
@@ -876,11 +895,11 @@ def _encode_in_memory(path: Path, spec: Any, pixels: NDArray) -> None:
     if not hasattr(os, "memfd_create"):
         if shutil.disk_usage(path.parent).free < most:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        _write_image(path, str(path), spec, pixels)
+        _write_image(path, str(path), spec, pixels, rows)
         return
     memory = os.memfd_create("dyehouse")
     try:
-        _write_image(path, f"/proc/self/fd/{memory}", spec, pixels)
+        _write_image(path, f"/proc/self/fd/{memory}", spec, pixels, rows)
         os.lseek(memory, 0, os.SEEK_SET)
         with path.open("wb") as file:
             while part := os.read(memory, 1 << 20):
@@ -889,15 +908,24 @@ def _encode_in_memory(path: Path, spec: Any, pixels: NDArray) -> None:
         os.close(memory)
 
 
-def _write_image(path: Path, target: str, spec: Any, pixels: NDArray) -> None:
+def _write_image(path: Path, target: str, spec: Any, pixels: NDArray, rows: Iterable[int] | None) -> None:
     import OpenImageIO
 
     output = OpenImageIO.ImageOutput.create(str(path))
     if output is None:
         raise FileError(f"'{path.name}' cannot be encoded ({OpenImageIO.geterror()}): use another extension.")
-    done = output.open(target, spec) and output.write_image(pixels)
-    reason = output.geterror()
-    closed = output.close()
+    done = output.open(target, spec)
+    try:
+        if rows is None:
+            done = done and output.write_image(pixels)
+        else:
+            top = 0
+            for bottom in rows:
+                if done and bottom > top:
+                    done, top = output.write_scanlines(top, bottom, 0, pixels[top:bottom]), bottom
+        reason = output.geterror()
+    finally:
+        closed = output.close()
     reason = reason or output.geterror()
     if not (done and closed) or reason:
         first = reason.replace(str(path), "the file").strip().split("\n")[0].rstrip(" .")

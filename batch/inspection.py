@@ -19,8 +19,8 @@ from . import files
 PAPER_RESIDUAL = 0.27
 
 
-def report(photo: files.Photo, prepared: Prepared, shares: Shares) -> dict[str, Any]:
-    """Everything worth knowing, as plain values for JSON."""
+def report(photo: files.Photo, prepared: Prepared) -> dict[str, Any]:
+    """Everything worth knowing before the pixels are touched, as plain values for JSON."""
     regions = []
     for k, analysis in enumerate(prepared.analyses):
         region = prepared.recipe.regions[k]
@@ -55,9 +55,16 @@ def report(photo: files.Photo, prepared: Prepared, shares: Shares) -> dict[str, 
         "white": [float(v) for v in prepared.white],
         "white_source": prepared.white_source,
         "target_white": [float(v) for v in prepared.target_white],
-        "out_of_gamut_share": shares.out_of_gamut,
         "regions": regions,
-        "warnings": prepared.warnings + _gamut_warning(shares),
+        "warnings": prepared.warnings,
+    }
+
+
+def with_shares(figures: dict[str, Any], shares: Shares) -> dict[str, Any]:
+    """The same report with what the output could not hold."""
+    return figures | {
+        "out_of_gamut_share": shares.out_of_gamut,
+        "warnings": figures["warnings"] + _gamut_warning(shares),
     }
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..core.compositing import unmix_edge
 from ..core.picture import Picture
 from ..core.recipe import Prepared, Recipe, prepare
-from ..core.recolor import Shares, recolor
+from ..core.recolor import Recoloring, RegionMatrix, Shares
 from ..core.swatches import Swatch
 from . import files
 
@@ -36,7 +38,7 @@ def look(photo: files.Photo, recipe: Recipe, base: Path | None = None) -> Prepar
     return prepare(picture, recipe, space=photo.space, photo_white=photo.white, alpha=alpha, read_mask=read_mask)
 
 
-def recolored(
+def recoloring(
     photo: files.Photo,
     prepared: Prepared,
     path: str | Path,
@@ -45,8 +47,8 @@ def recolored(
     reuse: bool = False,
     out: NDArray | None = None,
     threads: int | None = None,
-) -> tuple[NDArray, Shares]:
-    """Pixels of the recolored photo as the output file wants them.
+) -> Recoloring:
+    """Set up the recolor of a photo into the pixels that the output file wants.
 
     Parameters
     ----------
@@ -62,6 +64,41 @@ def recolored(
         Array of an earlier colorway of the same photo and kind of output, to be overwritten.
     threads
         None for one per core.
+    """
+    dtype, space = files.output_dtype(path, photo), files.output_space(path, photo)
+    height, width, channels = photo.pixels.shape
+    picture, regions = prepared.analyses[0].picture, prepared.regions(swatches)
+    if channels == 4 and photo.premultiplied and not files.output_premultiplied(path, photo):
+        picture = Picture(_divided(picture.linear(), photo.pixels[..., 3]))
+        # The edges were unmixed in light multiplied by alpha.
+        regions = [
+            RegionMatrix(r.matrix, r.mask, None if r.mask is None else unmix_edge(picture, r.mask)) for r in regions
+        ]
+    if out is None:
+        same = dtype == photo.pixels.dtype and space.curve == photo.space.curve
+        out = photo.pixels if reuse and same else np.empty((height, width, channels), dtype)
+    if channels == 4 and out is not photo.pixels:
+        out[..., 3] = converted(photo.pixels[..., 3], dtype)
+    return Recoloring(picture, regions, curve=space.curve, dtype=dtype, out=out, threads=threads)
+
+
+def _must_multiply(photo: files.Photo, path: str | Path) -> bool:
+    return photo.pixels.shape[2] == 4 and not photo.premultiplied and files.output_premultiplied(path, photo)
+
+
+def recolored(
+    photo: files.Photo,
+    prepared: Prepared,
+    path: str | Path,
+    swatches: Sequence[Swatch | None] | None = None,
+    **options: Any,
+) -> tuple[NDArray, Shares]:
+    """Pixels of the recolored photo as the output file wants them.
+
+    Parameters
+    ----------
+    photo, prepared, path, swatches, options
+        As for :func:`recoloring`.
 
     Returns
     -------
@@ -70,25 +107,49 @@ def recolored(
     shares
         What the output could not hold.
     """
-    dtype, space = files.output_dtype(path, photo), files.output_space(path, photo)
-    height, width, channels = photo.pixels.shape
-    analyzed = prepared.analyses[0].picture
-    wants_premultiplied = channels == 4 and files.output_premultiplied(path, photo)
-    has_premultiplied = channels == 4 and photo.premultiplied
-    regions = prepared.regions(swatches)
-    if has_premultiplied and not wants_premultiplied:
-        straight = _divided(analyzed.linear(), photo.pixels[..., 3])
-        regions = [type(r)(r.matrix, r.mask) for r in regions]  # edges were unmixed in premultiplied light
-        analyzed = Picture(straight)
-    same = dtype == photo.pixels.dtype and space.curve == photo.space.curve
-    if out is None:
-        out = photo.pixels if reuse and same else np.empty((height, width, channels), dtype)
-    _, shares = recolor(analyzed, regions, curve=space.curve, dtype=dtype, out=out, threads=threads)
-    if channels == 4 and out is not photo.pixels:
-        out[..., 3] = converted(photo.pixels[..., 3], dtype)
-        if wants_premultiplied and not has_premultiplied:
-            out[..., :3] *= out[..., 3:]
-    return out, shares
+    job = recoloring(photo, prepared, path, swatches, **options)
+    for _ in job.rows():
+        pass
+    if _must_multiply(photo, path):
+        job.out[..., :3] *= job.out[..., 3:]
+    return job.out, job.shares
+
+
+def save(
+    photo: files.Photo,
+    prepared: Prepared,
+    path: str | Path,
+    swatches: Sequence[Swatch | None] | None = None,
+    *,
+    force: bool = False,
+    quality: int = 95,
+    compression: str | None = None,
+    **options: Any,
+) -> tuple[Path, Shares]:
+    """Recolor a photo into a file; rows are encoded while the next ones are recolored.
+
+    Parameters
+    ----------
+    photo, prepared, path, swatches, options
+        As for :func:`recoloring`.
+    force, quality, compression
+        As for :func:`files.write`.
+
+    Returns
+    -------
+    path
+        The file.
+    shares
+        What it could not hold.
+    """
+    rows: Iterator[int] | None = None
+    if _must_multiply(photo, path):
+        pixels, shares = recolored(photo, prepared, path, swatches, **options)
+    else:
+        job = recoloring(photo, prepared, path, swatches, **options)
+        pixels, rows = job.out, job.rows()
+    written = files.write(path, pixels, photo, force=force, quality=quality, compression=compression, rows=rows)
+    return written, job.shares if rows else shares
 
 
 def _divided(linear: NDArray[np.float32], alpha: NDArray) -> NDArray[np.float32]:

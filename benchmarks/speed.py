@@ -132,8 +132,7 @@ def _prepared(source: Path) -> tuple[files.Photo, Prepared]:
 
 def _recolor_file(source: Path, output: Path) -> None:
     opened, prepared = _prepared(source)
-    pixels, _ = photo.recolored(opened, prepared, output, reuse=True)
-    files.write(output, pixels, opened, force=True)
+    photo.save(opened, prepared, output, reuse=True, force=True)
 
 
 def in_files(table: Table, folder: Path, linear: NDArray[np.float32], rounds: int) -> None:
@@ -176,8 +175,7 @@ def in_files(table: Table, folder: Path, linear: NDArray[np.float32], rounds: in
         def further(
             output: Path = output, opened: files.Photo = opened, prepared: Prepared = prepared, room: NDArray = room
         ) -> None:
-            pixels, _ = photo.recolored(opened, prepared, output, [parse_target(_OTHERS[0])], out=room)
-            files.write(output, pixels, opened, force=True)
+            photo.save(opened, prepared, output, [parse_target(_OTHERS[0])], out=room, force=True)
 
         def encode_only(plain: Path = plain, opened: files.Photo = opened, spec: oiio.ImageSpec = spec) -> None:
             encode(opened.pixels, plain, spec)

@@ -37,7 +37,9 @@ def fit_to_gamut(linear: NDArray[np.float32]) -> int:
     """
     if linear.size == 0 or (linear.max() <= 1 + TOLERANCE and linear.min() >= -TOLERANCE):
         return 0
-    outside = np.flatnonzero(out_of_gamut(linear))
+    # Channels first, for speed: a channel's place over three is its pixel's, and they come in order.
+    channels = np.flatnonzero((linear > 1 + TOLERANCE) | (linear < -TOLERANCE)) // 3
+    outside = channels[np.diff(channels, prepend=-1) > 0]
     pixels = linear[outside]
     grey = np.clip(pixels @ _LUMINANCE, 0.0, 1.0)[:, None]
     away = pixels - grey

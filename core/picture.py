@@ -12,7 +12,7 @@ from . import transfer
 from .errors import ImageError, MaskError
 
 # Pixels in one band: its working arrays fit the second-level cache, and the calls for it are few.
-BAND_PIXELS = 48_000
+BAND_PIXELS = 72_000
 
 
 class Picture:
@@ -119,7 +119,7 @@ def bands(height: int, width: int, start: int = 0) -> Iterator[slice]:
 
 def strips(height: int, width: int) -> Iterator[tuple[int, int]]:
     """(top, bottom) of strips of rows that are worth one step of array work, and small beside the picture."""
-    rows = max(1, 8 * BAND_PIXELS // width)
+    rows = max(1, 5 * BAND_PIXELS // width)
     for top in range(0, height, rows):
         yield top, min(height, top + rows)
 

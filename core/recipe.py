@@ -194,6 +194,8 @@ def prepare(
     ):
         if given not in known:
             raise RecipeError(f"{what} '{given}' is not known: use {' or '.join(known)}.")
+    if recipe.camera is not None:
+        spectra.camera_sensitivities(recipe.camera)  # says in words if there is none
     for region in recipe.regions:
         if region.meaning not in MEANINGS:
             raise RecipeError(f"Meaning '{region.meaning}' is not known: use one of {', '.join(MEANINGS)}.")

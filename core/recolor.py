@@ -7,7 +7,7 @@ that fit the cache, on all cores, and only inside the region's bounding box.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,6 +23,9 @@ from .picture import Picture, as_weights, bands
 # Pixels in one matrix product: under the size from which OpenBLAS spreads a product over threads, which is many
 # times slower when another process uses the cores.
 _PRODUCT_PIXELS = 24_000
+
+# Bands that one thread does in a row.
+_STRIP_BANDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,30 +112,79 @@ def recolor(
     ImageError
         If the picture has NaN or infinite pixels.
     """
-    dtype = np.dtype(dtype)
-    curve = curve or transfer.LINEAR
-    height, width = picture.shape
-    same_codes = dtype == picture.pixels.dtype and curve == picture.curve
-    if out is None:
-        out = np.empty((height, width, 3), dtype)
-    rows, columns = _bounds(regions, height, width)
-    whole = (rows.stop - rows.start, columns.stop - columns.start) == (height, width)
-    in_place = np.shares_memory(out, picture.pixels)
-    if same_codes and not whole and not in_place:
-        np.copyto(out[..., :3], picture.pixels[..., :3])
-    elif not same_codes:
-        rows, columns = slice(0, height), slice(0, width)  # everything must be encoded anew
+    job = Recoloring(picture, regions, curve=curve, dtype=dtype, out=out, threads=threads)
+    for _ in job.rows():
+        pass
+    return job.out, job.shares
 
-    job = _Job(picture, regions, columns, curve, dtype, out)
-    parts = list(bands(rows.stop - rows.start, max(1, columns.stop - columns.start), rows.start))
-    workers = min(threads or os.process_cpu_count() or 1, max(1, len(parts) // 4))
-    if workers == 1:
-        counts = [job.run(parts)]
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            counts = list(pool.map(job.run, [parts[k::workers] for k in range(workers)]))
-    pixels, outside = (sum(c) for c in zip(*counts, strict=True))
-    return out, Shares(int(pixels), float(outside / pixels) if pixels else 0.0)
+
+class Recoloring:
+    """A recolor that tells how far it is, so that a file can be encoded while it goes on.
+
+    Parameters
+    ----------
+    picture, regions, curve, dtype, out, threads
+        As for :func:`recolor`.
+
+    Attributes
+    ----------
+    out
+        The result; its rows are done as far as :meth:`rows` has told.
+    shares
+        What was outside the output's range, once all rows are done.
+    """
+
+    def __init__(
+        self,
+        picture: Picture,
+        regions: Sequence[RegionMatrix],
+        *,
+        curve: transfer.Curve | None = None,
+        dtype: DTypeLike = np.float32,
+        out: NDArray | None = None,
+        threads: int | None = None,
+    ) -> None:
+        self._dtype = np.dtype(dtype)
+        self._height, self._width = picture.shape
+        self._threads = threads or os.process_cpu_count() or 1
+        self.out = np.empty((self._height, self._width, 3), self._dtype) if out is None else out
+        self.shares = Shares(0, 0.0)
+        self._rows, columns = _bounds(regions, self._height, self._width)
+        if self._dtype != picture.pixels.dtype or (curve or transfer.LINEAR) != picture.curve:
+            # Everything must be encoded anew.
+            self._rows, columns = slice(0, self._height), slice(0, self._width)
+        self._job = _Job(picture, regions, columns, curve or transfer.LINEAR, self._dtype, self.out)
+
+    def rows(self) -> Iterator[int]:
+        """Do the work; yields the number of rows from the top that are done, growing to the height.
+
+        Raises
+        ------
+        ImageError
+            If the picture has NaN or infinite pixels.
+        """
+        job, counts = self._job, []
+        columns = job.columns
+        whole = (self._rows.stop - self._rows.start, columns.stop - columns.start) == (self._height, self._width)
+        if not whole and not np.shares_memory(self.out, job.picture.pixels):
+            np.copyto(self.out[..., :3], job.picture.pixels[..., :3])
+        parts = list(bands(self._rows.stop - self._rows.start, max(1, columns.stop - columns.start), self._rows.start))
+        strips = [parts[k : k + _STRIP_BANDS] for k in range(0, len(parts), _STRIP_BANDS)]
+        if min(self._threads, len(strips)) <= 1:
+            for strip in strips:
+                counts.append(job.run(strip))
+                yield strip[-1].stop
+        else:
+            pool = ThreadPoolExecutor(min(self._threads, len(strips)))
+            try:
+                for strip, result in zip(strips, [pool.submit(job.run, strip) for strip in strips], strict=True):
+                    counts.append(result.result())
+                    yield strip[-1].stop
+            finally:
+                pool.shutdown(cancel_futures=True)
+        pixels, outside = (sum(c) for c in zip(*counts, strict=True)) if counts else (0, 0)
+        self.shares = Shares(int(pixels), float(outside / pixels) if pixels else 0.0)
+        yield self._height
 
 
 def _bounds(regions: Sequence[RegionMatrix], height: int, width: int) -> tuple[slice, slice]:
@@ -165,6 +217,10 @@ class _Job:
         self.integer, self.floats = dtype.kind == "u", picture.pixels.dtype.kind == "f"
         # Linear float32 needs no encoding: the result is made where it belongs.
         self.same_codes = dtype == picture.pixels.dtype and curve == picture.curve
+        # Float codes do not survive decoding and encoding to the last bit: outside the regions they are put back.
+        self.restore = (
+            self.same_codes and self.floats and not curve.is_linear and all(r.mask is not None for r in regions)
+        )
         self.direct = dtype == np.float32 and curve.is_linear and not np.shares_memory(out, picture.pixels)
         # A pixel times the transposed matrix, so that (n, 3) rows need no turning round.
         self.matrices = [np.ascontiguousarray(r.matrix.T, np.float32) for r in regions]
@@ -192,13 +248,18 @@ class _Job:
             linear = decoder.into(stored.reshape(n, 3), scratch[:n])
             in_target = self.direct and target.flags.c_contiguous
             result = target.reshape(n, 3) if in_target else product[:n]
-            inside += self._apply(rows, linear, weights, result)
+            with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is told in words below
+                inside += self._apply(rows, linear, weights, result)
             if self.floats and not np.isfinite(np.vdot(result, result)):
                 _check_finite(result)
             if self.integer:
                 outside += gamut.fit_to_gamut(result)
             if not in_target:
+                before = stored.copy() if self.restore else stored
                 encoder.into(result, target, scratch[:n].view(np.int32))
+                if self.restore:
+                    outer = np.all([w == 0 for w in weights if w is not None], axis=0).reshape(target.shape[:2])
+                    target[outer] = before[outer]
         return inside, outside
 
     def _apply(

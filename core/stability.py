@@ -21,7 +21,7 @@ def noise_gain(reference: NDArray, white: NDArray) -> float:
     infinite for grey.
     """
     s = sine(reference, white)
-    return 1 / s if s > 0 else float("inf")
+    return 1 / s if s > 1e-6 else float("inf")  # below, it is rounding
 
 
 def matrix_gain(matrix: NDArray) -> float:

@@ -1,0 +1,71 @@
+"""Pictures whose truth is known by construction, and the two real photographs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+@dataclass
+class Product:
+    """A glossy, shaded ball on a grey ground, in scene-linear RGB."""
+
+    image: np.ndarray
+    mask: np.ndarray  # 1 on the product, 0 beside it
+    shading: np.ndarray
+    gloss: np.ndarray
+    body: np.ndarray  # V, where shading is 1 and gloss 0
+    white: np.ndarray  # W
+    matte: tuple[int, int]  # a pixel of shading 1 without gloss
+
+    def in_color(self, body: np.ndarray, white: np.ndarray) -> np.ndarray:
+        """The same product without noise in another color and light."""
+        return self.shading[..., None] * body + self.gloss[..., None] * white
+
+
+@pytest.fixture
+def product() -> Callable[..., Product]:
+    """A factory of products."""
+
+    def make(
+        body=(0.42, 0.09, 0.05), white=(1.0, 1.0, 1.0), *, size=96, noise=0.002, gloss=1.0, ground=0.35, seed=0
+    ) -> Product:
+        v, w = np.asarray(body, float), np.asarray(white, float)
+        y, x = np.mgrid[:size, :size] / (size - 1) * 2 - 1
+        inside = np.hypot(x, y) < 0.85
+        height = np.sqrt(np.clip(0.85**2 - x**2 - y**2, 0, None)) / 0.85
+        # Light from the top left: shading by Lambert, at 1 where the surface faces the light; a lobe of gloss there.
+        facing = np.clip((-0.5 * x / 0.85 - 0.5 * y / 0.85 + 0.7071 * height), 0, 1)
+        shading = np.where(inside, 0.12 + 0.88 * facing, 0.0)
+        lobe = np.where(inside, gloss * 0.7 * np.exp(-((1 - facing) / 0.02)), 0.0)
+        image = shading[..., None] * v + lobe[..., None] * w
+        image[~inside] = ground * w
+        image += np.random.default_rng(seed).normal(0, noise, image.shape) if noise else 0.0
+        dull = np.where(inside & (lobe < 1e-4), shading, 0)
+        row, column = np.unravel_index(np.argmax(dull), dull.shape)
+        return Product(image.astype(np.float32), inside.astype(float), shading, lobe, v, w, (int(column), int(row)))
+
+    return make
+
+
+def photo_of_skimage(name: str) -> Path:
+    """The file of a photo that scikit-image carries."""
+    found = find_spec("skimage")
+    assert found is not None
+    assert found.origin is not None
+    return Path(found.origin).parent / "data" / name
+
+
+@pytest.fixture(scope="session")
+def astronaut_file() -> Path:
+    return photo_of_skimage("astronaut.png")
+
+
+@pytest.fixture(scope="session")
+def coffee_file() -> Path:
+    return photo_of_skimage("coffee.png")
