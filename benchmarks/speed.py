@@ -202,7 +202,7 @@ sys.exit(status)
 """
 
 
-def _process(arguments: list[str]) -> tuple[float, float]:
+def process(arguments: list[str]) -> tuple[float, float]:
     """Seconds and peak resident megabytes of the command line as a process of its own."""
     started = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", _CHILD, *arguments], capture_output=True, text=True, check=True)
@@ -229,8 +229,8 @@ def processes(table: Table, folder: Path, rounds: int, width: int) -> list[str]:
     ]
     starts, runs = [], []
     for _ in range(rounds):
-        starts.append(_process(["--help"])[0])
-        runs.append(_process(small)[0])
+        starts.append(process(["--help"])[0])
+        runs.append(process(small)[0])
     table.add("dyehouse --help, whole process", starts, None, "0.3 s")
     table.add("1 MP PNG, one click, whole process", runs, None, "1 s")
     lines = ["| file | peak resident memory | of which the decoded picture |", "|---|---|---|"]
@@ -240,7 +240,7 @@ def processes(table: Table, folder: Path, rounds: int, width: int) -> list[str]:
             part = transfer.encode(test_picture(1000, width), SRGB.curve, np.uint8)
             codes = np.concatenate([part] * (height // 1000))
             files.write(source, codes, files.Photo(source, codes, SRGB), force=True)
-            _, peak = _process(["recolor", str(source), *options, "-o", str(folder / f"tall-out.{suffix}")])
+            _, peak = process(["recolor", str(source), *options, "-o", str(folder / f"tall-out.{suffix}")])
             decoded = codes.nbytes / 2**20
             lines.append(f"| {suffix}, {height * width / 1e6:.0f} MP | {peak:.0f} MB | {decoded:.0f} MB |")
     return lines
