@@ -18,6 +18,10 @@ from .picture import Picture, as_weights, strips
 # Coverage that close to 0 or 1 counts as none or all.
 _CLEAR = 0.004
 
+# How far to look for clear background, in pixels: near first, farther for wide soft edges. Where there is none
+# the share is ``a V``, a plain blend.
+_RADII = (6, 30)
+
 
 @dataclass(frozen=True, eq=False)
 class Edge:
@@ -41,7 +45,7 @@ class Edge:
         return slice(int(first), int(last))
 
 
-def unmix_edge(picture: Picture, mask: NDArray, radius: int = 6) -> Edge | None:
+def unmix_edge(picture: Picture, mask: NDArray) -> Edge | None:
     """Find the product's share in every pixel of soft coverage, from the background beside it.
 
     Parameters
@@ -50,8 +54,6 @@ def unmix_edge(picture: Picture, mask: NDArray, radius: int = 6) -> Edge | None:
         The photo.
     mask
         (height, width) checked coverage.
-    radius
-        How far to look for clear background, in pixels. Where there is none the share is ``a V``, a plain blend.
 
     Returns
     -------
@@ -64,9 +66,16 @@ def unmix_edge(picture: Picture, mask: NDArray, radius: int = 6) -> Edge | None:
         rows, columns = np.nonzero((cover > _CLEAR) & (cover < 1 - _CLEAR))
         if len(rows) == 0:
             continue
-        first = max(0, top - radius)
-        outside = as_weights(mask[first : bottom + radius]) <= _CLEAR
-        background, known = mean_nearby(picture, outside, rows + top, columns, radius, top=first)
+        background, known = np.zeros((len(rows), 3), np.float32), np.zeros(len(rows), bool)
+        for radius in _RADII:
+            missing = np.flatnonzero(~known)
+            if len(missing) == 0:
+                break
+            first = max(0, top - radius)
+            outside = as_weights(mask[first : bottom + radius]) <= _CLEAR
+            background[missing], known[missing] = mean_nearby(
+                picture, outside, rows[missing] + top, columns[missing], radius, top=first
+            )
         a = cover[rows, columns][:, None]
         pixels = picture.at(rows + top, columns)
         share = np.where(known[:, None], pixels - (1 - a) * background, a * pixels)

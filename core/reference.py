@@ -81,7 +81,7 @@ def read_window(picture: Picture, pixel: tuple[int, int], mask: NDArray | None =
 
 def trimmed_mean(pixels: NDArray, keep: float = 0.6) -> NDArray[np.float64]:
     """(3,) mean of the share of (n, 3) pixels that lie nearest to their median: blind to specks and edges."""
-    middle = np.median(pixels, axis=0)
+    middle = np.quantile(pixels, 0.5, axis=0)
     distance = np.linalg.norm(pixels - middle, axis=1)
     nearest = np.argsort(distance, kind="stable")[: max(1, round(keep * len(pixels)))]
     return pixels[nearest].mean(axis=0, dtype=np.float64)
@@ -148,7 +148,7 @@ def _gloss_in(color: NDArray, picture: Picture, pixel: tuple[int, int], white: N
         return 0.0
     # The matte edge of the wedge: the most colored tenth, without its own outliers.
     edge = np.quantile(paler[same], 0.1)
-    matte = np.median(around[same & (paler <= edge + 0.005)], axis=0)
+    matte = np.quantile(around[same & (paler <= edge + 0.005)], 0.5, axis=0)
     if sine(matte) < 0.05:
         return 0.0
     return float(max(0.0, np.linalg.lstsq(np.column_stack([matte, np.ones(3)]), color / white, rcond=None)[0][1]))
@@ -211,7 +211,7 @@ def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = Non
     colored = 1 - balanced.min(axis=1) / balanced.mean(axis=1)
     low, high = np.quantile(colored, (0.55, 0.95))
     edge = balanced[(colored >= low) & (colored <= high)]
-    return Reference(np.median(edge, axis=0) * white)
+    return Reference(np.quantile(edge, 0.5, axis=0) * white)
 
 
 def _main_material(balanced: NDArray) -> NDArray[np.bool_]:
@@ -309,7 +309,7 @@ def white_from_highlights(
     size = np.linalg.norm(across, axis=1)
     # Highlights: far from the body line, and brighter than the body usually is.
     bright = along > np.quantile(along, 0.5)
-    spread = float(np.median(size[bright])) + 1e-9
+    spread = float(np.quantile(size[bright], 0.5)) + 1e-9
     glossy = bright & (size > 4 * spread) & (size > 0.03)
     if np.count_nonzero(glossy) < max(20, 0.0005 * len(pixels)):
         raise WhiteError("The product shows no highlights to find the white from: pick a white card or name the light.")

@@ -249,15 +249,15 @@ class _Grower:
         if len(pixels) < 30:
             return body, _LEAST
         light = pixels.sum(axis=1)
-        lit = pixels[light >= np.median(light)]
-        body = np.median(lit / lit.sum(axis=1, keepdims=True), axis=0) * body.sum()
+        lit = pixels[light >= np.quantile(light, 0.5)]
+        body = np.quantile(lit / lit.sum(axis=1, keepdims=True), 0.5, axis=0) * body.sum()
         along, out, paler = (values[inside] for values in self._angles(body))
-        usable = along > 0.2 * np.median(along)
+        usable = along > 0.2 * np.quantile(along, 0.5)
         off, pale = (np.degrees(np.arctan2(c[usable], along[usable])) for c in (out, paler))
         # Where the material varies enough along the plane to show it, the plane is learned too.
         tilt = 0.0
         if np.std(pale) > 1.0:
-            tilt = float(np.clip(np.median(off * pale) / np.median(pale * pale), -_MOST_TILT, _MOST_TILT))
+            tilt = float(np.clip(np.quantile(off * pale, 0.5) / np.quantile(pale * pale, 0.5), -_MOST_TILT, _MOST_TILT))
         wide, long = (4 * _half_range(values) for values in (off - tilt * pale, pale))
         return body, _Tolerance(
             float(np.clip(wide, _LEAST.out, _MOST.out)),

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from dyehouse.core import Picture, analyze, transfer
 from dyehouse.core.errors import ImageError
 from dyehouse.core.picture import BAND_PIXELS
-from dyehouse.core.recolor import RegionMatrix, recolor
+from dyehouse.core.recolor import Recoloring, RegionMatrix, recolor
 
 RNG = np.random.default_rng(7)
 M1 = np.array([[0.2, 0.5, 0.1], [0.3, 0.1, 0.2], [0.6, 0.1, 0.3]])
@@ -313,3 +313,38 @@ def test_huge_ordinary_numbers_are_no_error():
     image = np.full((4, 5, 3), 1e25, np.float32)
     result, _ = recolor(Picture(image), [RegionMatrix(M1)])
     np.testing.assert_allclose(result, image @ M1.T.astype(np.float32), rtol=1e-5)
+
+
+# --- row by row -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_rows_are_done_as_far_as_it_tells(threads, masked, dtype):
+    height, width = 20 * BAND_PIXELS // 401, 401
+    pixels = (RNG.random((height, width, 3)) * (255 if dtype == np.uint8 else 1)).astype(dtype)
+    curve = transfer.SRGB if dtype == np.uint8 else None
+    mask = blob(height, width, height // 2, 200, 180) if masked else None
+    arguments = {"curve": curve, "dtype": dtype, "threads": threads}
+    wanted, shares = recolor(Picture(pixels, curve), [RegionMatrix(M1, mask)], **arguments)
+    out = np.full_like(pixels, 77)
+    job = Recoloring(Picture(pixels, curve), [RegionMatrix(M1, mask)], out=out, **arguments)
+    told = []
+    for done in job.rows():
+        np.testing.assert_array_equal(out[:done], wanted[:done])
+        told.append(done)
+    assert told == sorted(told)
+    assert told[-1] == height
+    assert len(told) > 1
+    assert job.out is out
+    assert job.shares == shares
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_bad_pixels_are_refused_row_by_row_too(threads):
+    image = RNG.random((20 * BAND_PIXELS // 401, 401, 3), dtype=np.float32)
+    image[-1, -1, 2] = np.nan
+    job = Recoloring(Picture(image), [RegionMatrix(M1)], threads=threads)
+    with pytest.raises(ImageError, match="NaN or infinite"):
+        list(job.rows())
