@@ -465,7 +465,7 @@ def _read_raw(path: Path, color_space: str | None) -> Photo:
         import rawpy
     except ImportError:
         raise FileError(
-            f"'{path}' is a camera RAW file, which needs rawpy: install it with: pip install dyehouse[raw]"
+            f"'{path}' is a camera RAW file, which needs rawpy: install it with: pip install rawpy"
         ) from None
     name = color_space or "linear-srgb"
     primaries = {

@@ -30,6 +30,9 @@ LARGEST_NOISE_GAIN = 6.0
 _GLOSSY = 0.04
 _SAMPLE = 200_000
 
+# Share of the picture under which a region is so small that a click has probably missed the product.
+_FEWEST_PIXELS = 0.001
+
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
@@ -292,6 +295,11 @@ def _warnings(picture: Picture, found: Reference, white: NDArray, mask: NDArray 
         )
     if (found.color / white).max() < 4 * DARK:
         said.append("The reference is dark, so its color is uncertain: click a better lit part.")
+    if mask is not None and np.count_nonzero(mask) < _FEWEST_PIXELS * mask.size:
+        said.append(
+            f"The region covers only {np.count_nonzero(mask)} of {mask.size} pixels: if that is not all of the "
+            "product, click another part of it or raise the tolerance."
+        )
     pixels = picture.sample(_SAMPLE // 4, mask) if mask is not None else picture.overview
     clipped = float((pixels.max(axis=1) >= picture.clip_level).mean())
     if clipped > 0.01:

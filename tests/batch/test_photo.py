@@ -12,7 +12,7 @@ from PIL import Image
 from dyehouse.batch import files, photo
 from dyehouse.core import transfer
 from dyehouse.core.colorspace import SPACES
-from dyehouse.core.errors import MaskError
+from dyehouse.core.errors import ImageError, MaskError
 from dyehouse.core.recipe import Recipe, Region
 from dyehouse.core.swatches import parse_target
 
@@ -143,6 +143,55 @@ def test_soft_edge_of_a_premultiplied_photo_to_straight_codes():
     plain = opened(straight.astype(np.float32), LINEAR)
     wanted, _ = photo.recolored(plain, photo.look(plain, recipe), "out.png")
     assert np.abs(out[..., :3].astype(int) - wanted).max() <= 60
+
+
+# --- into a file ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("extension", ["png", "jpg", "tif", "exr", "webp"])
+@pytest.mark.parametrize("kind", ["8 bits", "16 bits", "floats"])
+@pytest.mark.parametrize("alpha", [False, True])
+def test_saved_files_are_those_of_the_whole_pixels(ball, tmp_path, extension, kind, alpha):
+    if kind == "floats":
+        pixels, space = np.tile(ball.image, (8, 8, 1)), LINEAR
+    else:
+        dtype = np.uint8 if kind == "8 bits" else np.uint16
+        pixels, space = transfer.encode(np.tile(ball.image, (8, 8, 1)), transfer.SRGB, dtype), SRGB
+    if alpha:
+        top = 1 if kind == "floats" else np.iinfo(pixels.dtype).max
+        cover = np.full(pixels.shape[:2], top, pixels.dtype)
+        if extension != "jpg":  # which holds no transparency
+            cover[:200] = top // 2 if top > 1 else 0.5
+        pixels = np.dstack([pixels, cover])
+    recipe = Recipe((Region(BLUE, reference=tuple(ball.body), mask=np.tile(ball.mask, (8, 8))),))
+    source = opened(pixels.copy(), space)
+    prepared = photo.look(source, recipe)
+    whole, shares = tmp_path / f"whole.{extension}", tmp_path / f"saved.{extension}"
+    out, counted = photo.recolored(source, prepared, whole)
+    files.write(whole, out, source)
+    for options in ({"threads": 1}, {"threads": 2, "reuse": True}):
+        written, shares = photo.save(source, prepared, tmp_path / f"saved.{extension}", force=True, **options)
+        assert shares == counted
+        assert written == tmp_path / f"saved.{extension}"
+        np.testing.assert_array_equal(files.read(written).pixels, files.read(whole).pixels)
+        assert sorted(p.name for p in tmp_path.iterdir()) == [f"saved.{extension}", f"whole.{extension}"]
+
+
+@pytest.mark.parametrize("extension", ["png", "jpg", "tif", "exr", "webp"])
+def test_when_a_bad_pixel_turns_up_while_writing_nothing_is_left(ball, tmp_path, extension):
+    # The reader refuses such files; this is memory gone bad, or a caller's own array.
+    image = np.tile(ball.image, (20, 10, 1))
+    image[-1, -1, 0] = np.nan
+    source = opened(image, LINEAR)
+    prepared = photo.look(source, Recipe((Region(BLUE, reference=tuple(ball.body)),)))
+    out = tmp_path / f"out.{extension}"
+    with pytest.raises(ImageError, match="NaN or infinite"):
+        photo.save(source, prepared, out)
+    assert list(tmp_path.iterdir()) == []
+    out.write_bytes(b"precious")
+    with pytest.raises(ImageError, match="NaN or infinite"):
+        photo.save(source, prepared, out, force=True)
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"precious"]
 
 
 # --- alpha and coverage in another type -------------------------------------------------------------------------

@@ -485,3 +485,14 @@ def test_bad_targets(product, target):
         analysis.recolor(TARGET, (0, 1, 1))
     with pytest.raises(DyehouseError, match="Residual rule"):
         analysis.recolor(TARGET, residual="most")
+
+
+@pytest.mark.parametrize(("covered", "warned"), [(3, True), (400, False)])
+def test_a_tiny_region_is_warned_of(product, covered, warned):
+    scene = product()
+    mask = np.zeros(scene.image.shape[:2], bool)
+    side = int(np.ceil(covered**0.5))
+    y, x = np.argwhere(scene.mask == 1).mean(axis=0).astype(int)
+    mask[y : y + side, x : x + side] = True
+    warnings = analyze(scene.image, reference=scene.body, mask=mask).warnings
+    assert any("covers only" in text for text in warnings) == warned
