@@ -27,7 +27,7 @@ MODELS = ("auto", *dichromatic.MODELS)
 LARGEST_NOISE_GAIN = 6.0
 
 # Gloss in a clicked reference, as a share of the white, from which it is reported.
-_GLOSSY = 0.04
+_GLOSSY = 0.03
 _SAMPLE = 200_000
 
 # Share of the picture under which a region is so small that a click has probably missed the product.

@@ -18,6 +18,9 @@ from .picture import Picture, as_weights, strips
 # Coverage that close to 0 or 1 counts as none or all.
 _CLEAR = 0.004
 
+# A share this far below zero, against the pixel, is no share.
+_IMPOSSIBLE = 0.1
+
 # How far to look for clear background, in pixels: near first, farther for wide soft edges. Where there is none
 # the share is ``a V``, a plain blend.
 _RADII = (6, 30)
@@ -78,7 +81,10 @@ def unmix_edge(picture: Picture, mask: NDArray) -> Edge | None:
             )
         a = cover[rows, columns][:, None]
         pixels = picture.at(rows + top, columns)
-        share = np.where(known[:, None], pixels - (1 - a) * background, a * pixels)
+        share = pixels - (1 - a) * background
+        # A mask that was blurred, not seen: the pixel is no such mixture, so nothing can be subtracted from it.
+        impossible = (share < -_IMPOSSIBLE * np.abs(pixels).max(axis=1, keepdims=True)).any(axis=1)
+        share = np.where((known & ~impossible)[:, None], share, a * pixels)
         # No more light than the pixel has, and none below zero beyond what the pixel itself shows.
         share = np.clip(share, np.minimum(pixels, 0), np.maximum(pixels, 0))
         found.append((rows + top, columns, share.astype(np.float32)))
