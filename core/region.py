@@ -23,6 +23,9 @@ from .reference import DARK, _plane, check_pixel, read_window, trimmed_mean
 # Pixels of the reduced picture on which the region is grown.
 _WORKING_PIXELS = 300_000
 
+# Pixels of a selection from which its scatter is learned.
+_LEARNED_PIXELS = 30_000
+
 # Half the step of 8-bit sRGB codes near black, in linear light.
 _DARK_STEP = 1.5e-4
 
@@ -169,10 +172,13 @@ def shrink(picture: Picture, step: int) -> NDArray[np.float32]:
     if step == 1:
         return picture.linear()
     rows, columns = height // step, width // step
-    out = np.empty((rows, columns, 3), np.float32)
-    for k in range(rows):
-        block = picture.linear(slice(k * step, (k + 1) * step), slice(0, columns * step)).sum(axis=0)
-        out[k] = block.reshape(columns, step, 3).sum(axis=1) / np.float32(step * step)
+    out = np.zeros((rows, columns, 3), np.float32)
+    for top, bottom in strips(rows, columns * step * step):
+        block = picture.linear(slice(top * step, bottom * step), slice(0, columns * step))
+        for down in range(step):
+            for across in range(step):
+                out[top:bottom] += block[down::step, across::step]
+    out /= np.float32(step * step)
     return out
 
 
@@ -243,8 +249,16 @@ class _Grower:
         steps[:, 1:] |= across
         return steps
 
+    def _some_of(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Every n-th pixel of a selection, enough to learn from."""
+        places = np.flatnonzero(inside)
+        some = np.zeros(inside.size, bool)
+        some[places[:: max(1, len(places) // _LEARNED_PIXELS)]] = True
+        return some.reshape(inside.shape)
+
     def learn(self, inside: NDArray, body: NDArray) -> tuple[NDArray, _Tolerance]:
         """Body color and tolerance of the material, from what a strict growth found."""
+        inside = self._some_of(inside)
         pixels = self.balanced[inside]
         if len(pixels) < 30:
             return body, _LEAST
@@ -339,10 +353,11 @@ def _connected(similar: NDArray, start: tuple[int, int]) -> NDArray[np.bool_]:
         added = False
         for reach, least in _JUMPS:
             near = dilate(inside, max(2, round(reach * max(similar.shape))))
-            reached = np.unique(labels[near])
-            new = reached[(reached > 0) & ~chosen[reached] & (sizes[reached] >= max(12, least * total))]
-            chosen[new] = True
-            added |= len(new) > 0
+            reached = np.bincount(labels[near], minlength=count + 1) > 0
+            reached[0] = False
+            new = reached & ~chosen & (sizes >= max(12, least * total))
+            chosen |= new
+            added |= bool(new.any())
         if not added:
             return dilate(inside, 2) & similar
 
