@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
         epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    top.add_argument("--version", action="version", version=f"dyehouse {_version()}")
+    top.add_argument("--version", action=_ShowVersion, nargs=0, help="show the version and exit")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, help_text in (
         ("recolor", "write the photo with the product in another color"),
@@ -118,13 +118,17 @@ def _add_recipe(command: argparse.ArgumentParser) -> None:
     )
 
 
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
+class _ShowVersion(argparse.Action):
+    """Look the version up only when it is asked for."""
 
-    try:
-        return version("dyehouse")
-    except PackageNotFoundError:  # run from Blender, where it is an extension and not a distribution
-        return "(extension)"
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            print("dyehouse", version("dyehouse"))
+        except PackageNotFoundError:  # run from Blender, where it is an extension and not a distribution
+            print("dyehouse (extension)")
+        parser.exit()
 
 
 def _numbers(text: str, what: str, counts: tuple[int, ...]) -> tuple[float, ...]:
