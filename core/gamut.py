@@ -35,10 +35,16 @@ def fit_to_gamut(linear: NDArray[np.float32]) -> int:
     -------
     Number of pixels that were outside.
     """
-    if linear.size == 0 or (linear.max() <= 1 + TOLERANCE and linear.min() >= -TOLERANCE):
+    above = linear.size > 0 and linear.max() > 1 + TOLERANCE
+    below = linear.size > 0 and linear.min() < -TOLERANCE
+    if not (above or below):
         return 0
     # Channels first, for speed: a channel's place over three is its pixel's, and they come in order.
-    channels = np.flatnonzero((linear > 1 + TOLERANCE) | (linear < -TOLERANCE)) // 3
+    if above and below:
+        outlying = (linear > 1 + TOLERANCE) | (linear < -TOLERANCE)
+    else:
+        outlying = linear > 1 + TOLERANCE if above else linear < -TOLERANCE
+    channels = np.flatnonzero(outlying) // 3
     outside = channels[np.diff(channels, prepend=-1) > 0]
     pixels = linear[outside]
     grey = np.clip(pixels @ _LUMINANCE, 0.0, 1.0)[:, None]
