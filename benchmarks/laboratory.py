@@ -35,6 +35,7 @@ import OpenImageIO
 from numpy.typing import ArrayLike, NDArray
 
 from dyehouse.core import spectra, transfer
+from dyehouse.core.neighborhood import erode
 from dyehouse.sample_blends import make_scenes
 
 type Light = str | float | spectra.Spectrum
@@ -191,13 +192,6 @@ def _by_group(given: Illuminant | None, lights: Mapping[str, RGB]) -> dict[str, 
     if missing := lights.keys() - by_name.keys():
         raise ValueError(f"The scene has another light group that needs a color: {', '.join(sorted(missing))}.")
     return {group: np.asarray(by_name[group], np.float32) for group in lights}
-
-
-def erode(region: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Take `reach` pixels off the edge of a region; the edge of the picture is no edge of the region."""
-    padded = np.pad(region, reach, mode="edge")
-    rows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=0).all(axis=-1)
-    return np.lib.stride_tricks.sliding_window_view(rows, 2 * reach + 1, axis=1).all(axis=-1)
 
 
 # --- Spectra ----------------------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ..core import analyze, colorimetry, transfer
 from ..core.colorspace import LINEAR_SRGB
 from ..core.errors import DyehouseError, ReferenceColorError
+from ..core.neighborhood import erode
 from ..core.picture import Picture
 from ..core.reference import matte_reference, read_window, reference_at
 from . import laboratory
@@ -414,13 +415,13 @@ def mask_edge(
     soft, hard = Series("blurred, sigma"), Series("hard, grown by")
     trials = _trials("mug", settings)
     true = trials[0].mask
-    band = ~laboratory.erode(true > 0.999, 3) & ~laboratory.erode(true < 0.001, 3)
+    band = ~erode(true > 0.999, 3) & ~erode(true < 0.001, 3)
     for sigma in blurs:
         mask = _blurred(true, sigma)
         soft.add(sigma, [replace(t, mask=mask, where=band) for t in trials])
     for reach in grown:
         inside = true > 0.5
-        inside = ~laboratory.erode(~inside, reach) if reach > 0 else laboratory.erode(inside, -reach)
+        inside = ~erode(~inside, reach) if reach > 0 else erode(inside, -reach)
         hard.add(reach, [replace(t, mask=inside.astype(np.float32), where=band) for t in trials])
     return Curve("Edge of the mask", "pixels", [soft, hard])
 

@@ -61,11 +61,6 @@ class Picture:
         """(height, width)."""
         return self.pixels.shape[0], self.pixels.shape[1]
 
-    @property
-    def is_linear_float32(self) -> bool:
-        """Whether the stored pixels are what `linear` returns, so that no decoding is needed."""
-        return self.pixels.dtype == np.float32 and self.curve.is_linear and self.pixels.shape[2] == 3
-
     def linear(self, rows: slice = slice(None), columns: slice = slice(None)) -> NDArray[np.float32]:
         """(height, width, 3) float32 scene-linear RGB of a part; may be a view of the pixels, do not write to it."""
         part = self.pixels[rows, columns, :3]
