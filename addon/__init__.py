@@ -1,8 +1,45 @@
 """The Blender side: everything that touches bpy, and nothing else."""
 
-from . import command
+from . import (
+    background,
+    command,
+    nodes,
+    overlays,
+    panels,
+    panels_nodes,
+    preview,
+    properties,
+    session,
+    swatches,
+    thumbnails,
+)
+from .operators import colorways as colorway_operators
+from .operators import compositor, photo, pick, recipe, recolor, regions, texture, write
+from .operators import swatches as swatch_operators
 
-_PARTS = (command,)
+_PARTS = (
+    properties,
+    background,
+    session,
+    thumbnails,
+    preview,
+    overlays,
+    photo,
+    regions,
+    pick,
+    recolor,
+    colorway_operators,
+    write,
+    recipe,
+    swatches,
+    swatch_operators,
+    panels,
+    nodes,
+    texture,
+    compositor,
+    panels_nodes,
+    command,
+)
 
 
 def register() -> None:

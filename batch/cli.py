@@ -1,4 +1,4 @@
-"""The command line: `dyehouse recolor | inspect | demo`.
+"""The command line: `dyehouse recolor | inspect | batch | verify | swatches | demo`.
 
 Blender serves the same parser as `blender --command dyehouse`. Numpy and everything heavier is imported inside the
 commands, so that `--help` is instant.
@@ -12,6 +12,7 @@ import json
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,12 +61,21 @@ def parser() -> argparse.ArgumentParser:
             command.add_argument("--force", action="store_true", help="overwrite an existing output")
             command.add_argument("--quality", type=int, default=95, help="of JPEG and WebP, 1..100 (default 95)")
             command.add_argument("--compression", help="of TIFF and EXR, such as zip or none (default: the photo's)")
+            command.add_argument(
+                "--output-space",
+                metavar="NAME",
+                help="of the output, if not the photo's own: display-p3, rec2020, acescg, ...",
+            )
+            command.add_argument("--no-verify", action="store_true", help="do not check the color of the written file")
             command.set_defaults(run=_recolor)
         else:
             command.add_argument("--maps", metavar="DIR", help="write A, B, residual and predicted error there")
             command.add_argument("--force", action="store_true", help="overwrite existing maps")
             command.set_defaults(run=_inspect)
         command.add_argument("--json", action="store_true", help="print one JSON object, for machines")
+    _add_batch(commands)
+    _add_verify(commands)
+    _add_swatches(commands)
     demo = commands.add_parser("demo", help="recolor two real photos and write pictures, maps and a contact sheet")
     demo.add_argument("--out", metavar="DIR", default="dyehouse-demo", help="folder to write to (default %(default)s)")
     demo.add_argument("--json", action="store_true", help="print one JSON object, for machines")
@@ -73,8 +83,75 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _add_batch(commands: Any) -> None:
+    command = commands.add_parser("batch", help="put a catalog of photos into their colorways")
+    command.add_argument(
+        "tables", metavar="RECIPE_OR_TABLE", nargs="+", help="recipes (.toml) and tables (.csv, .tsv, .jsonl)"
+    )
+    command.add_argument("--out", metavar="DIR", required=True, help="output folder, or URL such as s3://bucket/folder")
+    command.add_argument("--recipe", metavar="FILE", help="recipe for what the tables leave open")
+    command.add_argument("--check", action="store_true", help="only say what is wrong, all of it, and write nothing")
+    command.add_argument("--resume", action="store_true", help="do only what is missing or has changed")
+    command.add_argument("--force", action="store_true", help="make everything anew over an earlier run")
+    command.add_argument(
+        "--workers", type=int, metavar="N", help="processes on this machine (default one per core; 0: this one)"
+    )
+    command.add_argument("--scheduler", metavar="ADDRESS", help="dask.distributed scheduler, such as tcp://host:8786")
+    command.add_argument(
+        "--per-task", type=int, default=1, metavar="N", help="photos a worker takes at once (default 1)"
+    )
+    command.add_argument("--max-error", type=float, metavar="D", help="set aside what is predicted to be farther off")
+    command.add_argument("--allow-warnings", action="store_true", help="do not set aside for warnings alone")
+    command.add_argument("--no-sheets", action="store_true", help="no contact sheets and no page")
+    command.add_argument("--journal", metavar="FILE", help="the run's journal (default: in the output folder)")
+    command.add_argument("--quiet", action="store_true", help="print only what went wrong")
+    command.add_argument("--json", action="store_true", help="print a JSON object a line, for machines")
+    command.set_defaults(run=_batch)
+
+
+def _add_observer(command: Any) -> None:
+    command.add_argument("--observer", choices=("1931", "1964"), default="1931", help="2 or 10 degrees (default 1931)")
+    command.add_argument("--camera", metavar="NAME|CSV", help="sensitivities, for spectra and illuminants")
+    command.add_argument("--adaptation", choices=("cat16", "bradford"), default="cat16", help="default cat16")
+
+
+def _add_verify(commands: Any) -> None:
+    command = commands.add_parser("verify", help="compare a picture's color at a pixel with the asked one")
+    command.add_argument("photo", metavar="IMAGE", help="the picture to look at")
+    command.add_argument("--reference", metavar="X,Y", required=True, help="matte pixel of the product")
+    command.add_argument("--target", metavar="SWATCH", required=True, help="the color that was asked for")
+    command.add_argument("--within", type=float, metavar="D", help="exit with 1 if it is farther than D CIEDE2000")
+    command.add_argument("--illuminant", metavar="LIGHT", help="light on the product, for a spectrum")
+    _add_observer(command)
+    command.add_argument("--color-space", metavar="NAME", help="the picture's, if the file does not say")
+    command.add_argument("--json", action="store_true", help="print one JSON object, for machines")
+    command.set_defaults(run=_verify)
+
+
+def _add_swatches(commands: Any) -> None:
+    command = commands.add_parser("swatches", help="list, search and convert swatch files; colors under other lights")
+    command.add_argument(
+        "place", metavar="LIBRARY", nargs="?", help="swatch file, folder or built-in library, or one swatch of it as "
+        "LIBRARY#NAME; without it the built-in libraries are listed"
+    )  # fmt: skip
+    command.add_argument("--search", metavar="WORDS", default="", help="only those with these words in their names")
+    command.add_argument("--nearest", metavar="SWATCH", help="the nearest to this color first, by CIEDE2000")
+    command.add_argument("--count", type=int, metavar="N", help="at most so many (of the nearest: 10)")
+    command.add_argument("--under", metavar="LIGHTS", help="how spectra look under these lights, as D65,A,FL11")
+    command.add_argument("--against", metavar="SWATCH", help="metamerism index of spectra against this spectrum")
+    command.add_argument("--plain-cmyk", action="store_true", help="read CMYK without a profile, roughly")
+    command.add_argument("-o", "--output", metavar="FILE", help="write them as .ase, .aco, .gpl, .cxf, .csv or .txt")
+    command.add_argument("--force", action="store_true", help="overwrite an existing file")
+    command.add_argument("--json", action="store_true", help="print one JSON object, for machines")
+    command.set_defaults(run=_swatches)
+
+
 def _add_recipe(command: argparse.ArgumentParser) -> None:
     command.add_argument("photo", metavar="PHOTO", help="PNG, JPEG, TIFF, EXR, WebP or camera raw")
+    command.add_argument(
+        "--recipe", metavar="FILE", help="recipe file, instead of the options for product, color, light"
+    )
+    command.add_argument("--colorway", metavar="NAME", help="of the recipe file")
     product = command.add_argument_group("the product")
     product.add_argument("--reference", metavar="X,Y", help="matte, lit pixel of the product; or R,G,B linear")
     product.add_argument("--click", metavar="X,Y", help="select the product under this pixel, and find its color")
@@ -108,9 +185,7 @@ def _add_recipe(command: argparse.ArgumentParser) -> None:
     )
     light.add_argument("--gray", type=float, default=1.0, help="reflectance of the card (default 1; grey card 0.18)")
     light.add_argument("--illuminant", metavar="LIGHT", help="new light: a name, a temperature, or R,G,B")
-    light.add_argument("--observer", choices=("1931", "1964"), default="1931", help="2 or 10 degrees (default 1931)")
-    light.add_argument("--camera", metavar="NAME|CSV", help="sensitivities, for spectra and illuminants")
-    light.add_argument("--adaptation", choices=("cat16", "bradford"), default="cat16", help="default cat16")
+    _add_observer(light)
     command.add_argument(
         "--color-space",
         metavar="NAME",
@@ -178,7 +253,7 @@ def recipe_from(options: argparse.Namespace) -> Recipe:
     if options.region:
         regions = []
         for text in options.region:
-            given = _region_options(text)
+            given = region_options(text)
             regions.append(_region({**common, **given}))
     else:
         regions = [_region(common)]
@@ -196,7 +271,14 @@ def recipe_from(options: argparse.Namespace) -> Recipe:
     )
 
 
-def _region_options(text: str) -> dict[str, str]:
+def region_options(text: str) -> dict[str, str]:
+    """Read one region of the form ``KEY=VALUE ...``.
+
+    Raises
+    ------
+    RecipeError
+        If it has another form or an unknown key.
+    """
     import shlex
 
     from ..core.errors import RecipeError
@@ -244,20 +326,50 @@ def _region(given: dict):
 def _open(options: argparse.Namespace) -> tuple[files.Photo, Prepared]:
     from . import files, photo
 
-    recipe = recipe_from(options)
-    opened = files.read(options.photo, options.color_space)
+    recipe, color_space = _asked(options)
+    opened = files.read(options.photo, color_space)
     return opened, photo.look(opened, recipe)
 
 
-def _recolor(options: argparse.Namespace) -> int:
+def _asked(options: argparse.Namespace) -> tuple[Recipe, str | None]:
+    """The recipe, from its file or from the options, and the photo's color space."""
     from ..core.errors import RecipeError
-    from . import files, inspection, photo
+    from ..core.recipe import with_colorway
+    from ..core.recipe_file import nearest, read_recipe
+
+    if options.recipe is None:
+        if options.colorway is not None:
+            raise RecipeError(f"Colorway '{options.colorway}' is one of no recipe: give its file with --recipe.")
+        return recipe_from(options), options.color_space
+    plain = vars(parser().parse_args([options.command, "photo", *(["-o", "file"] if "output" in options else [])]))
+    for name in (*_KEYS, "region", "white", "gray", "illuminant", "observer", "camera", "adaptation"):
+        if getattr(options, name) != plain[name]:
+            raise RecipeError(f"--{name} and --recipe contradict each other: write it into the recipe file.")
+    stored = read_recipe(options.recipe)
+    recipe, found = stored.located(), {colorway.name: colorway for colorway in stored.recipe.colorways}
+    if options.colorway is not None:
+        if options.colorway not in found:
+            remedy = nearest(options.colorway, found) if found else "it has none"
+            raise RecipeError(f"Colorway '{options.colorway}' is not in '{options.recipe}': {remedy}.")
+        recipe = with_colorway(recipe, found[options.colorway])
+    elif found and not any(region.target for region in recipe.regions):
+        raise RecipeError(f"'{options.recipe}' has several colorways: choose one with --colorway {', '.join(found)}.")
+    return replace(recipe, colorways=()), options.color_space or stored.color_space
+
+
+def _recolor(options: argparse.Namespace) -> int:
+    from ..core.colorspace import space_named
+    from ..core.errors import RecipeError
+    from . import files, inspection, photo, verification
 
     if not 1 <= options.quality <= 100:
         raise RecipeError(f"Quality {options.quality} is not in 1..100: 95 is very good.")
     files.check_output(options.output, source=options.photo, force=options.force)
+    wanted = space_named(options.output_space) if options.output_space else None
     opened, prepared = _open(options)
+    opened.wanted = wanted
     figures = inspection.report(opened, prepared)  # before the photo's pixels are used up
+    expected = None if options.no_verify else verification.expect(opened, prepared)
     written, shares = photo.save(
         opened,
         prepared,
@@ -267,27 +379,62 @@ def _recolor(options: argparse.Namespace) -> int:
         compression=options.compression,
         reuse=True,
     )
-    _tell(options, inspection.with_shares(figures, shares) | {"output": str(written)})
+    checks = [] if expected is None else [check.as_dict() for check in expected.check(written)]
+    _tell(options, inspection.with_shares(figures, shares) | {"output": str(written), "verification": checks})
     return 0
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    from ..core import gamut
-    from ..core.recolor import Shares
     from . import inspection
 
     opened, prepared = _open(options)
-    pixels, outside = 0, 0.0
-    for k, analysis in enumerate(prepared.analyses):
-        sample = analysis.picture.sample(500_000, analysis.mask)
-        matrix = analysis.matrix(prepared.target(k), prepared.target_white, prepared.recipe.regions[k].residual)
-        pixels += len(sample)
-        outside += float(gamut.out_of_gamut(sample @ matrix.T).sum())
-    shares = Shares(pixels, outside / pixels if pixels else 0.0)
-    figures = inspection.with_shares(inspection.report(opened, prepared), shares)
+    figures = inspection.figures(opened, prepared)
     if options.maps:
         figures["maps"] = [str(p) for p in inspection.write_maps(prepared, Path(options.maps), force=options.force)]
     _tell(options, figures)
+    return 0
+
+
+def _batch(options: argparse.Namespace) -> int:
+    from . import catalog
+
+    return catalog.command_line(options)
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from ..core.swatches import parse_target
+    from . import verification
+
+    found = verification.verify(
+        options.photo,
+        _numbers(options.reference, "Reference", (2,)),
+        parse_target(options.target),
+        color_space=options.color_space,
+        illuminant=options.illuminant,
+        observer=options.observer,
+        camera=options.camera,
+        adaptation=options.adaptation,
+    )
+    print(json.dumps(found.as_dict(), indent=2) if options.json else found.sentence)
+    return int(options.within is not None and found.ciede2000 > options.within)
+
+
+def _swatches(options: argparse.Namespace) -> int:
+    from ..core import swatch_files
+    from . import swatch_listing
+
+    if options.place is None:
+        figures = swatch_listing.libraries()
+    else:
+        library, away = swatch_listing.choose(
+            options.place, options.search, options.nearest, options.count, options.plain_cmyk
+        )
+        lights = options.under.split(",") if options.under else ()
+        figures = swatch_listing.report(library, away, lights, options.against)
+        if options.output:
+            losses = swatch_files.write(options.output, library, force=options.force)
+            figures |= {"losses": losses, "output": options.output}
+    print(json.dumps(figures, indent=2) if options.json else swatch_listing.in_words(figures))
     return 0
 
 

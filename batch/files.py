@@ -10,7 +10,7 @@ import errno
 import os
 import secrets
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -94,6 +94,11 @@ class Photo:
         Sentences on what was not in the file and had to be assumed.
     metadata
         For `write`.
+    orientation
+        1 for an upright picture. Else the pixels are as they are stored, with that EXIF orientation, and `turned`
+        makes them upright.
+    wanted
+        The space whose primaries the output shall have; None for the photo's own.
     """
 
     path: Path
@@ -103,12 +108,44 @@ class Photo:
     white: tuple[float, float, float] | None = None
     assumptions: tuple[str, ...] = ()
     metadata: Any = None
+    orientation: int = 1
+    wanted: RGBSpace | None = None
+
+
+@dataclass
+class Decoded:
+    """The pixels of a file as they are stored, and what its decoder tells.
+
+    Attributes
+    ----------
+    pixels
+        (height, width, 3 or 4), the top row first.
+    spec
+        The header: an OpenImageIO.ImageSpec, or what answers `getattribute` and its kin as one does.
+    kind
+        ``png``, ``jpeg``, ``tiff``, ``webp`` or ``exr``.
+    notes
+        Sentences on what was left out.
+    associated
+        Whether RGB is multiplied by alpha.
+    grey
+        Whether the file holds grey values.
+    """
+
+    pixels: NDArray
+    spec: Any
+    kind: str
+    notes: list[str]
+    associated: bool
+    grey: bool
 
 
 # --- reading ------------------------------------------------------------------------------------------------
 
 
-def read(path: str | Path, color_space: str | None = None) -> Photo:
+def read(
+    path: str | Path, color_space: str | None = None, *, upright: bool = True, decoded: Decoded | None = None
+) -> Photo:
     """Read a picture.
 
     The color space comes from, in this order: `color_space`; PNG ``cICP``; the ICC profile; PNG ``sRGB``,
@@ -123,6 +160,10 @@ def read(path: str | Path, color_space: str | None = None) -> Photo:
     color_space
         A name of `core.colorspace.SPACES` that is used instead of what the file says. For a RAW file, the
         primaries to develop into.
+    upright
+        Turn the picture by its EXIF orientation.
+    decoded
+        The pixels, where another decoder than OpenImageIO has read them already.
 
     Raises
     ------
@@ -137,7 +178,11 @@ def read(path: str | Path, color_space: str | None = None) -> Photo:
     if path.suffix.lower() in RAW_EXTENSIONS:
         return _read_raw(path, color_space)
     blocks = _extract(path)
-    pixels, spec, kind, notes, associated, grey = _decode(path, blocks)
+    found = decoded or _decode(path, blocks)
+    pixels, kind, notes, associated, grey = found.pixels, found.kind, found.notes, found.associated, found.grey
+    orientation = blocks.orientation
+    if upright:
+        pixels, orientation = turned(pixels, orientation), 1
 
     premultiplied = False
     if associated and pixels.dtype.kind == "f":
@@ -148,15 +193,15 @@ def read(path: str | Path, color_space: str | None = None) -> Photo:
         space, tagged = override, True
     else:
         try:
-            space, tagged, note = _space(blocks, spec, kind, pixels.dtype, grey)
+            space, tagged, note = _space(blocks, found.spec, kind, pixels.dtype, grey)
         except FileError as error:
             raise FileError(f"'{path.name}': {error}") from None
         notes += note
     if grey and blocks.icc and icc.data_space(blocks.icc) == "GRAY":
         blocks.icc = b""
     metadata.upright(blocks)
-    source = _Source(kind, blocks, spec, tagged, override is not None, associated)
-    return Photo(path, pixels, space, premultiplied, None, tuple(notes), source)
+    source = _Source(kind, blocks, found.spec, tagged, override is not None, associated)
+    return Photo(path, pixels, space, premultiplied, None, tuple(notes), source, orientation)
 
 
 def _check_input(path: Path) -> None:
@@ -178,10 +223,14 @@ def _extract(path: Path) -> Blocks:
         raise FileError(f"'{path}' cannot be read ({error.strerror}): check its permissions.") from None
 
 
-def _decode(path: Path, blocks: Blocks) -> tuple[NDArray, Any, str, list[str], bool, bool]:
-    """Return upright pixels of 3 or 4 channels, the spec, the kind, what to tell, and associated, grey."""
-    import OpenImageIO
+def kind_of(path: Path, blocks: Blocks) -> str:
+    """The kind of a picture file by its first bytes, as `Decoded` has it.
 
+    Raises
+    ------
+    FileError
+        If it is none that can be read.
+    """
     kind = blocks.kind
     if not kind:
         with path.open("rb") as file:
@@ -190,7 +239,13 @@ def _decode(path: Path, blocks: Blocks) -> tuple[NDArray, Any, str, list[str], b
         raise FileError(f"'{path}' is no picture of a known kind: use PNG, JPEG, TIFF, EXR or WebP.")
     if kind == "jpeg" and blocks.components == 4:
         raise FileError(f"'{path}' is in CMYK: convert it to RGB first, through its color profile.")
+    return kind
 
+
+def _decode(path: Path, blocks: Blocks) -> Decoded:
+    import OpenImageIO
+
+    kind = kind_of(path, blocks)
     hints = OpenImageIO.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)  # straight alpha is delivered as stored, not multiplied in
     source = OpenImageIO.ImageInput.open(str(path), hints)
@@ -225,10 +280,9 @@ def _decode(path: Path, blocks: Blocks) -> tuple[NDArray, Any, str, list[str], b
         notes.append("The file is greyscale: it is read, and written, as RGB.")
     if kind == "exr":
         blocks.orientation = spec.get_int_attribute("Orientation", 1)
-    pixels = _turn(pixels, blocks.orientation)
     _check_finite(pixels, path)
     associated = alpha is not None and not spec.get_int_attribute("oiio:UnassociatedAlpha", 0)
-    return pixels, spec, kind, notes, associated, grey
+    return Decoded(pixels, spec, kind, notes, associated, grey)
 
 
 def _damaged(path: Path, reason: str) -> FileError:
@@ -284,15 +338,25 @@ def _sample_type(spec: Any, picked: list[int], path: Path) -> str:
     )
 
 
-def _turn(pixels: NDArray, orientation: int) -> NDArray:
-    """Make a picture upright (EXIF orientation: CIPA DC-008, 4.6.5.1.6)."""
-    if orientation in (5, 6, 7, 8):
-        pixels = pixels.transpose(1, 0, 2)
-    if orientation in (3, 4, 7, 8):
-        pixels = pixels[::-1]
-    if orientation in (2, 3, 6, 7):
-        pixels = pixels[:, ::-1]
+def turned(pixels: NDArray, orientation: int, back: bool = False) -> NDArray:
+    """Make a picture or a mask upright (EXIF orientation: CIPA DC-008, 4.6.5.1.6), or lay it `back` as it was."""
+    down, across = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
+    if orientation >= 5:
+        pixels = pixels.swapaxes(0, 1)
+        down, across = (across, down) if back else (down, across)
+    pixels = pixels[:: -1 if down else 1, :: -1 if across else 1]
     return np.ascontiguousarray(pixels)
+
+
+def turned_point(point: Sequence[float], shape: Sequence[int], orientation: int, back: bool = False) -> tuple:
+    """Where a pixel (x, y) of a (height, width) picture comes to lie when that is `turned`."""
+    x, y = point
+    height, width = shape[:2]
+    down, across = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
+    if orientation >= 5:
+        x, y, height, width = y, x, width, height
+        down, across = (across, down) if back else (down, across)
+    return (width - 1 - x if across else x, height - 1 - y if down else y)
 
 
 def _check_finite(pixels: NDArray, path: Path) -> None:
@@ -506,7 +570,7 @@ def _read_raw(path: Path, color_space: str | None) -> Photo:
 # --- masks --------------------------------------------------------------------------------------------------
 
 
-def read_mask(path: str | Path, shape: tuple[int, ...]) -> NDArray:
+def read_mask(path: str | Path, shape: tuple[int, ...], decoded: Decoded | None = None) -> NDArray:
     """Read a mask: how much of each pixel is the product.
 
     Parameters
@@ -516,6 +580,8 @@ def read_mask(path: str | Path, shape: tuple[int, ...]) -> NDArray:
         alpha channel and its color is the same everywhere, alpha is.
     shape
         (height, width, ...) of the upright photo.
+    decoded
+        As for `read`.
 
     Returns
     -------
@@ -532,21 +598,45 @@ def read_mask(path: str | Path, shape: tuple[int, ...]) -> NDArray:
     _check_input(path)
     if path.suffix.lower() in RAW_EXTENSIONS:
         raise MaskError(f"The mask '{path}' is a camera RAW file: save the mask as PNG.")
-    pixels, _, _, _, _, grey = _decode(path, _extract(path))
+    blocks = _extract(path)
+    found = decoded or _decode(path, blocks)
+    return coverage(turned(found.pixels, blocks.orientation), shape, f"The mask '{path}'")
+
+
+def coverage(pixels: NDArray, shape: tuple[int, ...], name: str) -> NDArray:
+    """Tell how much of each pixel is the product, from a mask's pixels.
+
+    Parameters
+    ----------
+    pixels
+        (height, width, 3 or 4) codes, or floats 0..1; see `read_mask`.
+    shape
+        (height, width, ...) of the photo.
+    name
+        What errors call the mask.
+
+    Returns
+    -------
+    (height, width) uint8, 0..255; or float32, 0..1, for pixels of more than 8 bits.
+
+    Raises
+    ------
+    MaskError
+        If it is of another size, or colored.
+    """
     height, width = shape[:2]
     if pixels.shape[:2] != (height, width):
         raise MaskError(
-            f"The mask '{path}' is {pixels.shape[1]} x {pixels.shape[0]} pixels and the photo {width} x {height}: "
+            f"{name} is {pixels.shape[1]} x {pixels.shape[0]} pixels and the photo {width} x {height}: "
             "make it the size of the photo."
         )
     color = pixels[..., :3]
     if pixels.shape[2] == 4 and (color == color[0, 0]).all():
         mask = pixels[..., 3]
     else:
-        red = color[..., 0]
-        if not grey and not ((red == color[..., 1]).all() and (red == color[..., 2]).all()):
-            raise MaskError(f"The mask '{path}' is colored: save it as greyscale, white where the product is.")
-        mask = red
+        mask = color[..., 0]
+        if not ((mask == color[..., 1]).all() and (mask == color[..., 2]).all()):
+            raise MaskError(f"{name} is colored: save it as greyscale, white where the product is.")
     if mask.dtype == np.uint8:
         return np.ascontiguousarray(mask)
     if mask.dtype.kind == "u":
@@ -621,18 +711,20 @@ def output_dtype(path: str | Path, photo: Photo) -> np.dtype:
 def output_space(path: str | Path, photo: Photo) -> RGBSpace:
     """Return the color space of the pixels to make for an output file.
 
-    The primaries are always the photo's own. Floats made from integers are linear; integers made from linear
-    floats or from RAW get a curve, as codes spread evenly over the light would show steps in the dark.
+    The primaries are the photo's own, or those of the space that is wanted. Floats made from integers are linear;
+    integers made from linear floats or from RAW get a curve, as codes spread evenly over the light would show steps in
+    the dark.
     """
     before, after = photo.pixels.dtype, output_dtype(path, photo)
-    space = photo.space
+    space = photo.space if photo.wanted is None else photo.wanted
     name = next((name for name, named in SPACES.items() if named is space), "")
     if after.kind == "f":
-        if before.kind == "f" or space.curve == transfer.LINEAR:
+        if (before.kind == "f" and photo.wanted is None) or space.curve == transfer.LINEAR:
             return space
         linear = {encoded: linear for linear, encoded in _ENCODED.items()}.get(name)
         return SPACES[linear] if linear else space.with_curve(transfer.LINEAR, f"Linear {space.name}")
-    if space.curve == transfer.LINEAR and (before != after or _source(photo).kind == "raw"):
+    wanted = photo.wanted is not None
+    if space.curve == transfer.LINEAR and (before != after or wanted or _source(photo).kind == "raw"):
         encoded = _ENCODED.get(name)
         return SPACES[encoded] if encoded else space.with_curve(transfer.SRGB, f"{space.name}, sRGB curve")
     return space
@@ -658,6 +750,7 @@ def write(
     quality: int = 95,
     compression: str | None = None,
     rows: Iterable[int] | None = None,
+    encode: Callable[[Path, NDArray, bool], None] | None = None,
 ) -> Path:
     """Write a picture with everything its source says besides the pixels.
 
@@ -682,6 +775,8 @@ def write(
     rows
         If `pixels` are still being made: how many rows from the top are done, growing to the height. They are
         encoded as they come.
+    encode
+        Another encoder than OpenImageIO, called with the file, its pixels and whether RGB is multiplied by alpha.
 
     Returns
     -------
@@ -706,12 +801,16 @@ def write(
         collections.deque(rows, maxlen=0)
         rows = None
     pixels = _fit(pixels, kind, path, photo)
-    spec = _output_spec(pixels, kind, path, photo, quality, compression)
+    spec = None if encode else _output_spec(pixels, kind, path, photo, quality, compression)
     blocks = _output_blocks(kind, path, photo)
     # The name is short and plain, so that it is possible wherever the file's own is.
     temporary = path.with_name(f".dyehouse-{secrets.token_hex(6)}{path.suffix}")
     try:
-        _encode(temporary, spec, pixels, rows)
+        if encode is not None:
+            integers = kind == "tiff" and pixels.dtype.kind == "u"
+            encode(temporary, pixels, _source(photo).associated if integers else output_premultiplied(path, photo))
+        else:
+            _encode(temporary, spec, pixels, rows)
         metadata.embed(temporary, blocks, kind, (width, height))
         if not force and path.exists():
             raise FileError(f"'{path}' exists already: choose another name or give --force.")
@@ -848,9 +947,7 @@ def _exr_attributes(spec: Any, path: Path, photo: Photo) -> None:
         spec.attribute("YResolution", float(density[1]))
         spec.attribute("ResolutionUnit", "cm" if density[2] == 3 else "in")
     if space.curve == transfer.LINEAR:
-        columns = np.column_stack([space.to_xyz, space.white])
-        xy = (columns[:2] / columns.sum(axis=0)).T.ravel()
-        spec.attribute("chromaticities", "float[8]", tuple(float(v) for v in xy))
+        spec.attribute("chromaticities", "float[8]", space.chromaticities)
 
 
 def _output_blocks(kind: str, path: Path, photo: Photo) -> Blocks:

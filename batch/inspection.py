@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import colorimetry
+from ..core import colorimetry, gamut
 from ..core.errors import FileError
 from ..core.recipe import Prepared
 from ..core.recolor import Shares
@@ -17,6 +17,9 @@ from . import files
 
 # Mean residual of a plastic cup in the paper, on the scale of 0..255.
 PAPER_RESIDUAL = 0.27
+
+# Pixels of a region from which its share out of gamut is estimated.
+_SAMPLE = 500_000
 
 
 def report(photo: files.Photo, prepared: Prepared) -> dict[str, Any]:
@@ -58,6 +61,17 @@ def report(photo: files.Photo, prepared: Prepared) -> dict[str, Any]:
         "regions": regions,
         "warnings": prepared.warnings,
     }
+
+
+def figures(photo: files.Photo, prepared: Prepared) -> dict[str, Any]:
+    """The report with what an output could not hold, estimated from a sample of the product."""
+    pixels, outside = 0, 0.0
+    for k, analysis in enumerate(prepared.analyses):
+        sample = analysis.picture.sample(_SAMPLE, analysis.mask, analysis.extra)
+        matrix = analysis.matrix(prepared.target(k), prepared.target_white, prepared.recipe.regions[k].residual)
+        pixels += len(sample)
+        outside += float(gamut.out_of_gamut(sample @ matrix.T).sum())
+    return with_shares(report(photo, prepared), Shares(pixels, outside / pixels if pixels else 0.0))
 
 
 def with_shares(figures: dict[str, Any], shares: Shares) -> dict[str, Any]:
@@ -112,6 +126,7 @@ def in_words(figures: dict[str, Any], *, brief: bool = False) -> str:
         lines.append(f"Out of gamut {figures['out_of_gamut_share']:.2%}")
     lines += [f"Note: {text}" for text in figures["assumptions"]]
     lines += [f"Warning: {text}" for text in figures["warnings"]]
+    lines += [f"Verified   {check['sentence']}" for check in figures.get("verification", [])]
     lines += [f"Wrote {path}" for path in ([figures["output"]] if "output" in figures else figures.get("maps", []))]
     return "\n".join(lines)
 

@@ -87,6 +87,8 @@ class Blocks:
         Whether a WebP is.
     pages
         Pages of a TIFF, or more than 1 for an animation.
+    associated
+        Whether the colors of a TIFF are multiplied by its alpha (TIFF 6.0, ExtraSamples).
     """
 
     kind: str = ""
@@ -104,6 +106,7 @@ class Blocks:
     components: int = 0
     lossless: bool = False
     pages: int = 1
+    associated: bool = False
 
     def color_chunk(self, name: bytes) -> bytes | None:
         """Return the body of the PNG chunk of that name, if there is one."""
@@ -365,6 +368,7 @@ def _exif_stream(main: Tags, subs: dict[int, Tags]) -> bytes:
 def _extract_tiff(file: BinaryIO, blocks: Blocks) -> None:
     main, subs, blocks.pages = _read_tree(file)
     blocks.orientation = _number(main, 0x0112, 1)
+    blocks.associated = _number(main, 338, 0) == 1
     blocks.icc = main.get(_TIFF_ICC, (0, 0, b""))[2]
     blocks.xmp = main.get(_TIFF_XMP, (0, 0, b""))[2]
     blocks.iptc = main.get(_TIFF_IPTC, (0, 0, b""))[2]
@@ -708,6 +712,21 @@ def _embed_tiff(path: Path, blocks: Blocks) -> None:
         file.write(body)
         file.seek(8 if big else 4)
         file.write(struct.pack("<Q" if big else "<I", first))
+
+
+def tell_association(path: Path, associated: bool) -> None:
+    """Say in a TIFF whether its colors are multiplied by its alpha (TIFF 6.0, ExtraSamples)."""
+    with path.open("r+b") as file:
+        order, big, start = _read_header(file)
+        size = 20 if big else 12
+        file.seek(start)
+        count = struct.unpack(order + ("Q" if big else "H"), file.read(8 if big else 2))[0]
+        entries = file.tell()
+        for place in range(entries, entries + count * size, size):
+            file.seek(place)
+            if struct.unpack(order + "H", file.read(2))[0] == 338:
+                file.seek(place + (12 if big else 8))
+                file.write(struct.pack(order + "H", 1 if associated else 2))
 
 
 def embed(path: Path, blocks: Blocks, kind: str, size: tuple[int, int]) -> None:

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..core.compositing import unmix_edge
+from ..core.colorimetry import conversion_matrix
+from ..core.compositing import Edge
 from ..core.picture import Picture
 from ..core.recipe import Prepared, Recipe, prepare
-from ..core.recolor import Recoloring, RegionMatrix, Shares
+from ..core.recolor import Recoloring, Shares
 from ..core.swatches import Swatch
 from . import files
 
 
-def look(photo: files.Photo, recipe: Recipe, base: Path | None = None) -> Prepared:
+def look(
+    photo: files.Photo,
+    recipe: Recipe,
+    base: Path | None = None,
+    read_mask: Callable[[str], NDArray] | None = None,
+) -> Prepared:
     """Analyze an opened photo for a recipe.
 
     Parameters
@@ -28,14 +35,60 @@ def look(photo: files.Photo, recipe: Recipe, base: Path | None = None) -> Prepar
         What is asked for. Mask files are relative to `base`.
     base
         Folder of the recipe; None for the current one.
+    read_mask
+        Gives the (height, width) coverage of a mask by name; None to read files.
     """
 
-    def read_mask(name: str) -> NDArray:
+    def read_file(name: str) -> NDArray:
         return files.read_mask((base or Path()) / name, photo.pixels.shape[:2])
 
     alpha = photo.pixels[..., 3] if photo.pixels.shape[2] == 4 else None
     picture = Picture(photo.pixels, photo.space.curve)
-    return prepare(picture, recipe, space=photo.space, photo_white=photo.white, alpha=alpha, read_mask=read_mask)
+    return prepare(
+        picture, recipe, space=photo.space, photo_white=photo.white, alpha=alpha, read_mask=read_mask or read_file
+    )
+
+
+def upright(photo: files.Photo, prepared: Prepared) -> tuple[files.Photo, Prepared]:
+    """Turn a photo that was read as it is stored, and look at it again for the same recipe: what files are made of."""
+    if photo.orientation == 1:
+        return photo, prepared
+    pairs = zip(prepared.recipe.regions, prepared.analyses, strict=True)
+    masks = {region.mask: analysis.selection for region, analysis in pairs if isinstance(region.mask, str)}
+    turned = replace(photo, pixels=files.turned(photo.pixels, photo.orientation), orientation=1)
+    recipe = turned_recipe(prepared.recipe, photo.pixels.shape, photo.orientation)
+    return turned, look(turned, recipe, read_mask=lambda name: files.turned(masks[name], photo.orientation))
+
+
+def turned_recipe(recipe: Recipe, shape: Sequence[int], orientation: int, back: bool = False) -> Recipe:
+    """The recipe for a photo that is turned as `files.turned` does: its positions; masks stay as they are.
+
+    Parameters
+    ----------
+    recipe
+        What is asked for.
+    shape
+        (height, width, ...) of the photo before.
+    orientation, back
+        As for :func:`files.turned`.
+    """
+
+    def moved(point: tuple[float, ...] | str | None) -> Any:
+        if point is None or isinstance(point, str) or len(point) != 2:
+            return point
+        return files.turned_point(point, shape, orientation, back)
+
+    regions = [
+        replace(
+            region,
+            reference=moved(region.reference),
+            click=moved(region.click),
+            added=tuple(moved(point) for point in region.added),
+            removed=tuple(moved(point) for point in region.removed),
+        )
+        for region in recipe.regions
+    ]
+    return replace(recipe, regions=tuple(regions), white=moved(recipe.white))
 
 
 def recoloring(
@@ -70,16 +123,30 @@ def recoloring(
     picture, regions = prepared.analyses[0].picture, prepared.regions(swatches)
     if channels == 4 and photo.premultiplied and not files.output_premultiplied(path, photo):
         picture = Picture(_divided(picture.linear(), photo.pixels[..., 3]))
-        # The edges were unmixed in light multiplied by alpha.
+        # The edges were unmixed, and the corrections made, in light multiplied by alpha.
+        alpha = photo.pixels[..., 3]
         regions = [
-            RegionMatrix(r.matrix, r.mask, None if r.mask is None else unmix_edge(picture, r.mask)) for r in regions
+            replace(
+                r,
+                edge=None if r.edge is None else _divided_edge(r.edge, alpha),
+                extra=None if r.extra is None else _divided(r.extra, alpha),
+            )
+            for r in regions
         ]
     if out is None:
         same = dtype == photo.pixels.dtype and space.curve == photo.space.curve
         out = photo.pixels if reuse and same else np.empty((height, width, channels), dtype)
     if channels == 4 and out is not photo.pixels:
         out[..., 3] = converted(photo.pixels[..., 3], dtype)
-    return Recoloring(picture, regions, curve=space.curve, dtype=dtype, out=out, threads=threads)
+    convert = None if photo.wanted is None else conversion_matrix(photo.space, space)
+    return Recoloring(picture, regions, curve=space.curve, dtype=dtype, out=out, threads=threads, convert=convert)
+
+
+def _watched(job: Recoloring, watch: Callable[[float], None] | None) -> Iterator[int]:
+    for done in job.rows():
+        if watch is not None:
+            watch(done / len(job.out))
+        yield done
 
 
 def _must_multiply(photo: files.Photo, path: str | Path) -> bool:
@@ -91,6 +158,8 @@ def recolored(
     prepared: Prepared,
     path: str | Path,
     swatches: Sequence[Swatch | None] | None = None,
+    *,
+    watch: Callable[[float], None] | None = None,
     **options: Any,
 ) -> tuple[NDArray, Shares]:
     """Pixels of the recolored photo as the output file wants them.
@@ -99,6 +168,8 @@ def recolored(
     ----------
     photo, prepared, path, swatches, options
         As for :func:`recoloring`.
+    watch
+        Called now and then with the share that is done, 0 to 1; what it raises stops the work.
 
     Returns
     -------
@@ -108,7 +179,7 @@ def recolored(
         What the output could not hold.
     """
     job = recoloring(photo, prepared, path, swatches, **options)
-    for _ in job.rows():
+    for _ in _watched(job, watch):
         pass
     if _must_multiply(photo, path):
         job.out[..., :3] *= job.out[..., 3:]
@@ -124,6 +195,7 @@ def save(
     force: bool = False,
     quality: int = 95,
     compression: str | None = None,
+    watch: Callable[[float], None] | None = None,
     **options: Any,
 ) -> tuple[Path, Shares]:
     """Recolor a photo into a file; rows are encoded while the next ones are recolored.
@@ -134,6 +206,8 @@ def save(
         As for :func:`recoloring`.
     force, quality, compression
         As for :func:`files.write`.
+    watch
+        As for :func:`recolored`; when it raises, no file is left.
 
     Returns
     -------
@@ -144,17 +218,21 @@ def save(
     """
     rows: Iterator[int] | None = None
     if _must_multiply(photo, path):
-        pixels, shares = recolored(photo, prepared, path, swatches, **options)
+        pixels, shares = recolored(photo, prepared, path, swatches, watch=watch, **options)
     else:
         job = recoloring(photo, prepared, path, swatches, **options)
-        pixels, rows = job.out, job.rows()
+        pixels, rows = job.out, _watched(job, watch)
     written = files.write(path, pixels, photo, force=force, quality=quality, compression=compression, rows=rows)
     return written, job.shares if rows else shares
 
 
-def _divided(linear: NDArray[np.float32], alpha: NDArray) -> NDArray[np.float32]:
+def _divided_edge(edge: Edge, alpha: NDArray) -> Edge:
+    return replace(edge, share=_divided(edge.share, alpha[edge.rows, edge.columns]))
+
+
+def _divided(linear: NDArray, alpha: NDArray) -> NDArray[np.float32]:
     a = alpha.astype(np.float32)[..., None]
-    return np.divide(linear, a, out=np.zeros_like(linear), where=a > 0)
+    return np.divide(linear, a, out=np.zeros(linear.shape, np.float32), where=a > 0)
 
 
 def converted(values: NDArray, dtype: DTypeLike) -> NDArray:
@@ -165,5 +243,6 @@ def converted(values: NDArray, dtype: DTypeLike) -> NDArray:
     if values.dtype.kind == "u":
         values = values / np.float32(np.iinfo(values.dtype).max)
     if dtype.kind == "u":
-        return np.floor(np.clip(values, 0, 1) * np.iinfo(dtype).max + 0.5).astype(dtype)
+        top = np.float32(np.iinfo(dtype).max)  # more than half floats can hold
+        return np.floor(np.clip(values, 0, 1).astype(np.float32) * top + np.float32(0.5)).astype(dtype)
     return values.astype(dtype)

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-_GAP, _LABEL = 12, 34
+# Paper around a picture, and height of the line under it, in pixels.
+GAP, LABEL = 12, 34
+
 _PAPER, _INK = 250, (0.13, 0.13, 0.13)
 
 
@@ -28,18 +30,18 @@ def contact_sheet(rows: Sequence[Sequence[tuple[str, NDArray[np.uint8]]]], width
     strips = [_row(row, width) for row in rows]
     across = max(strip.shape[1] for strip in strips)
     padded = [np.pad(s, ((0, 0), (0, across - s.shape[1]), (0, 0)), constant_values=_PAPER) for s in strips]
-    return np.concatenate([np.full((_GAP, across, 3), _PAPER, np.uint8), *padded])
+    return np.concatenate([np.full((GAP, across, 3), _PAPER, np.uint8), *padded])
 
 
 def _row(cells: Sequence[tuple[str, NDArray[np.uint8]]], width: int) -> NDArray[np.uint8]:
     parts = []
     for label, picture in cells:
         small = resized(picture, width)
-        cell = np.full((small.shape[0] + _LABEL + _GAP, width + _GAP, 3), _PAPER, np.uint8)
-        cell[: small.shape[0], _GAP:] = small
-        cell[small.shape[0] : small.shape[0] + _LABEL] = _text(label, width + _GAP)
+        cell = np.full((small.shape[0] + LABEL + GAP, width + GAP, 3), _PAPER, np.uint8)
+        cell[: small.shape[0], GAP:] = small
+        cell[small.shape[0] : small.shape[0] + LABEL] = _text(label, width + GAP)
         parts.append(cell)
-    return np.concatenate([*parts, np.full((parts[0].shape[0], _GAP, 3), _PAPER, np.uint8)], axis=1)
+    return np.concatenate([*parts, np.full((parts[0].shape[0], GAP, 3), _PAPER, np.uint8)], axis=1)
 
 
 def resized(picture: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
@@ -55,6 +57,6 @@ def resized(picture: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
 def _text(label: str, width: int) -> NDArray[np.uint8]:
     import OpenImageIO as oiio
 
-    strip = oiio.ImageBuf(np.full((_LABEL, width, 3), _PAPER, np.uint8))
-    oiio.ImageBufAlgo.render_text(strip, _GAP, _LABEL - 12, label, 17, "", _INK)
+    strip = oiio.ImageBuf(np.full((LABEL, width, 3), _PAPER, np.uint8))
+    oiio.ImageBufAlgo.render_text(strip, GAP, LABEL - 12, label, 17, "", _INK)
     return np.asarray(strip.get_pixels(oiio.UINT8))

@@ -1,7 +1,8 @@
-"""Export the CIE tables of colour-science to `core/tables/spectra.npz`, which `core` reads without it.
+"""Export the CIE tables of colour-science and the colors of CSS to `core/tables`, which `core` reads without them.
 
 Run as ``uv run python -m dyehouse.benchmarks.export_tables``. The data are the CIE's and the chart makers'
-own, as printed in colour-science (BSD-3-Clause); each array holds wavelengths in nm and then the values.
+own, as printed in colour-science (BSD-3-Clause); each array holds wavelengths in nm and then the values. The named
+colors are those of CSS Color Module Level 4, 6.1, as Pillow lists them.
 """
 
 from __future__ import annotations
@@ -10,13 +11,20 @@ from pathlib import Path
 
 import colour
 import numpy as np
+from PIL import ImageColor
 
-OUTPUT = Path(__file__).parent.parent / "core" / "tables" / "spectra.npz"
+TABLES = Path(__file__).parent.parent / "core" / "tables"
+OUTPUT, CSS_OUTPUT = TABLES / "spectra.npz", TABLES / "css.gpl"
 OBSERVERS = {
     "1931": "CIE 1931 2 Degree Standard Observer",
     "1964": "CIE 1964 10 Degree Standard Observer",
 }
 CHARTS = ("ISO 17321-1", "ColorChecker N Ohta", "BabelColor Average")
+# CIE 13.3-1995, and Davis & Ohno 2010, Opt. Eng. 49, 033602.
+TEST_COLORS = {
+    "CIE 13.3": colour.quality.datasets.SDS_TCS["CIE 1995"],
+    "NIST CQS": colour.quality.datasets.SDS_VS["NIST CQS 9.0"],
+}
 # Ends at 560 nm: it lights printing paper and means nothing to a camera.
 LEFT_OUT = "ISO 7589 Sensitometric Printer"
 
@@ -34,19 +42,29 @@ def tables() -> dict[str, np.ndarray]:
     found["daylight"] = np.column_stack([basis[0].wavelengths, *(function.values for function in basis)])
     for name, camera in colour.MSDS_CAMERA_SENSITIVITIES.items():
         found[f"camera/{name}"] = np.column_stack([camera.wavelengths, camera.values])
-    for chart in CHARTS:
-        patches = colour.SDS_COLOURCHECKERS[chart]
+    for chart, patches in ({name: colour.SDS_COLOURCHECKERS[name] for name in CHARTS} | TEST_COLORS).items():
         wavelengths = next(iter(patches.values())).wavelengths
         found[f"chart/{chart}"] = np.column_stack([wavelengths, *(patch.values for patch in patches.values())])
         found[f"patches/{chart}"] = np.array(list(patches))
     return found
 
 
+def css() -> str:
+    """Return the colors of CSS as a GIMP palette."""
+    lines = ["GIMP Palette", "Name: CSS", "Columns: 0", "#"]
+    for name, code in ImageColor.colormap.items():
+        red, green, blue = ImageColor.getrgb(code)[:3]
+        lines.append(f"{red:3d} {green:3d} {blue:3d}\t{name}")
+    return "\n".join(lines) + "\n"
+
+
 def main() -> None:
-    OUTPUT.parent.mkdir(exist_ok=True)
+    TABLES.mkdir(exist_ok=True)
+    CSS_OUTPUT.write_text(css())
     # mypy takes the names for savez's own keyword arguments.
     np.savez_compressed(OUTPUT, **tables())  # type: ignore[arg-type]
-    print(f"{OUTPUT}: {OUTPUT.stat().st_size} bytes")
+    for path in (OUTPUT, CSS_OUTPUT):
+        print(f"{path}: {path.stat().st_size} bytes")
 
 
 if __name__ == "__main__":

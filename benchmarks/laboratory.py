@@ -123,7 +123,7 @@ def view(scene: str, settings: Settings = FULL, **parameters: Any) -> View:
     Parameters
     ----------
     scene
-        Its name in `make_scenes.SCENES`.
+        Its name in `make_scenes.SCENES`, or the path of a .blend that carries the same custom properties.
     settings
         How to render.
     parameters
@@ -153,7 +153,7 @@ def render(
     Parameters
     ----------
     scene
-        Its name in `make_scenes.SCENES`.
+        Its name in `make_scenes.SCENES`, or the path of a .blend that carries the same custom properties.
     reflectance
         (3,) linear RGB of the dyed material.
     illuminant
@@ -274,7 +274,7 @@ def measure(scene: str, reflectance: ArrayLike, settings: Settings = FULL, **par
     Parameters
     ----------
     scene
-        Its name in `make_scenes.SCENES`.
+        Its name in `make_scenes.SCENES`, or the path of a .blend that carries the same custom properties.
     reflectance
         (31,) of the dyed material at `BANDS`, in 0..1.
     settings
@@ -341,7 +341,7 @@ class _Facts:
 
 @lru_cache(maxsize=256)
 def _facts(scene: str, parameters: tuple[tuple[str, Any], ...]) -> _Facts:
-    built = make_scenes.build(scene, **dict(parameters))
+    built = _build(scene, dict(parameters))
     _open[:] = [(scene, parameters)]
     groups = [group.name for group in built.view_layers[0].lightgroups]
     return _Facts(
@@ -353,6 +353,22 @@ def _facts(scene: str, parameters: tuple[tuple[str, Any], ...]) -> _Facts:
         dye=tuple(built["dye"]),
         colors={name: tuple(built[name]) for name in built.get("colors", "").split()},
     )
+
+
+def _build(scene: str, parameters: Mapping[str, Any]) -> bpy.types.Scene:
+    """Open a scene: one of ours by its name, or a .blend that carries the same custom properties."""
+    if not scene.endswith(".blend"):
+        return make_scenes.build(scene, **parameters)
+    bpy.ops.wm.open_mainfile(filepath=str(Path(scene).resolve()))
+    opened = bpy.context.scene
+    groups = [group.name for group in opened.view_layers[0].lightgroups]
+    needed = ["dye", "product", "reference_x", "reference_y"]
+    needed += [f"{group}_{what}" for group in groups for what in ("light", "share")]
+    missing = [name for name in needed if name not in opened]
+    if missing or not groups:
+        lacking = f"has no scene property {', '.join(missing)}" if missing else "has no light group"
+        raise ValueError(f"'{scene}' {lacking}: sample_blends/make_scenes.py tells what a scene carries.")
+    return opened
 
 
 _open: list[tuple[str, tuple[tuple[str, Any], ...]]] = []
@@ -390,10 +406,10 @@ def _exposure(
     properties = {"dye": list(dye), "diffuser": float(diffuser)}
     properties |= {name: list(color) for name, color in (facts.colors | dict(colors or {})).items()}
     recipe = json.dumps([facts.fingerprint, bpy.app.version_string, how, properties], sort_keys=True)
-    path = cache_folder() / f"{scene}-{hashlib.sha256(recipe.encode()).hexdigest()[:24]}.npz"
+    path = cache_folder() / f"{Path(scene).stem}-{hashlib.sha256(recipe.encode()).hexdigest()[:24]}.npz"
     if not path.exists():
         if key not in _open:
-            make_scenes.build(scene, **parameters)
+            _build(scene, parameters)
             _open[:] = [key]
         exposure = _render(bpy.context.scene, properties, settings)
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:

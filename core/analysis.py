@@ -1,30 +1,33 @@
 """Look at a photo once, then recolor it as often as wanted.
 
 `analyze` finds the footing (white, reference, model) and says how sure it is; the `Analysis` it returns recolors.
-Under the plain models a recolor is one 3x3 matrix, see `dichromatic`.
+Under every model a recolor is one matrix, on the pixel and at most a few maps that belong to the photo; see `mixture`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import dichromatic, stability
+from . import dichromatic, maps, mixture, stability
 from . import recolor as recoloring
-from .compositing import Edge, unmix_edge
+from .compositing import Edge, refine_outline, spill_weights
 from .errors import ImageError, ReferenceColorError, WhiteError
 from .picture import Picture, as_mask, as_weights
-from .reference import DARK, Reference, matte_reference, reference_at
+from .reference import DARK, Reference, matte_at, matte_reference
+from .selection import Evidence, choose
 
-MODELS = ("auto", *dichromatic.MODELS)
+MODELS = ("auto", *mixture.MODELS)
 
-# Noise gain above which "auto" leaves the dichromatic model, and the product counts as nearly grey. Found with
-# benchmarks/near_neutral.py: up to here the body model alone is worse, beyond it the split is.
+# Noise gain above which the product counts as nearly grey.
 LARGEST_NOISE_GAIN = 6.0
+
+# Share of a region that no model explains from which it is said.
+_UNEXPLAINED = 0.06
 
 # Gloss in a clicked reference, as a share of the white, from which it is reported.
 _GLOSSY = 0.03
@@ -48,34 +51,51 @@ class Analysis:
         (3,) float64 linear RGB of the product at the reference, V.
     pixel
         (x, y) of the reference, or None.
-    mask
-        (height, width) coverage of the product, or None for the whole picture.
-    model
-        "dichromatic" or "body".
+    selection
+        (height, width) coverage of the product as it was given, or None for the whole picture.
+    evidence
+        What the pixels show, and the model that was chosen or asked for.
     noise_gain
         By how much telling body from surface reflection multiplies noise, 1/sin of the angle between V and W.
     warnings
         Sentences for the user, each with a remedy.
+    gloss
+        Surface reflection that was found in the reference pixel and left out of `reference`, as a share of the white.
+    spill
+        Whether what shows of the product outside the selection is recolored too: its rim where the selection is too
+        tight, and the light that it throws on a neutral surround.
     """
 
     picture: Picture
     white: NDArray[np.float64]
     reference: NDArray[np.float64]
     pixel: tuple[int, int] | None
-    mask: NDArray | None
-    model: str
+    selection: NDArray | None
+    evidence: Evidence
     noise_gain: float
     warnings: tuple[str, ...]
+    gloss: float = 0.0
+    spill: bool = False
+
+    def matte_target(self, color: ArrayLike, target_white: ArrayLike | None = None) -> NDArray[np.float64]:
+        """(3,) target for a color that was read with its gloss, at the same place of a photo of a real sample.
+
+        The paper reads its targets so. Targets are matte colors: a swatch, or what a matte pixel shall show; the
+        gloss of the reference pixel is not in them and stays on top.
+        """
+        white = self.white if target_white is None else dichromatic.as_white(target_white)
+        return dichromatic.as_target(color) - self.gloss * white
 
     def matrix(
         self, target: ArrayLike, target_white: ArrayLike | None = None, residual: str | float = "fade"
     ) -> NDArray[np.float64]:
-        """(3, 3) matrix that recolors the region's pixels; see :func:`dichromatic.recolor_matrix`.
+        """(3, 3 + n) matrix that recolors the region's pixels and their n corrections, :attr:`extra`.
 
         Parameters
         ----------
         target
-            (3,) linear RGB that the reference shall have, V', under the new light.
+            (3,) linear RGB that the product shall have at the reference, V', under the new light; matte, see
+            :meth:`matte_target`.
         target_white
             (3,) white W' of the new light; None for an unchanged light.
         residual
@@ -87,13 +107,14 @@ class Analysis:
             If the target or its white is not three ordinary numbers.
         """
         share = dichromatic.residual_share(residual, self.reference, target, self.white, target_white)
-        return dichromatic.recolor_matrix(self.reference, target, self.white, target_white, self.model, residual=share)
+        white = self.white if target_white is None else dichromatic.as_white(target_white)
+        return self._mixture.matrix(dichromatic.as_target(target), white, share)
 
     def region(
         self, target: ArrayLike, target_white: ArrayLike | None = None, residual: str | float = "fade"
     ) -> recoloring.RegionMatrix:
         """Everything that :func:`recolor.recolor` needs to put the region into the target color."""
-        return recoloring.RegionMatrix(self.matrix(target, target_white, residual), self.mask, self.edge)
+        return recoloring.RegionMatrix(self.matrix(target, target_white, residual), self.mask, self.edge, self.extra)
 
     def recolor(
         self,
@@ -120,13 +141,55 @@ class Analysis:
         return recoloring.recolor(self.picture, [region], out=out)[0]
 
     @cached_property
+    def extra(self) -> NDArray | None:
+        """(height, width, n) corrections that :meth:`matrix` takes after red, green and blue; None if n is 0.
+
+        They depend on the photo alone, so that a new target only needs a new matrix.
+        """
+        if self._mixture.projector.shape[1] == 3:
+            return None
+        return maps.corrections(self._maps, self.mask, self.edge)
+
+    @property
+    def model(self) -> str:
+        """Name of the model, one of `mixture.MODELS`."""
+        return self.evidence.mixture.model
+
+    @cached_property
+    def _maps(self) -> maps.Region:
+        pixels = self.picture.sample(_SAMPLE // 4, self.selection)
+        clipped = bool((pixels >= self.picture.clip_level).any())
+        e = self.evidence
+        return maps.Region(self.picture, self.selection, e.mixture, e.noise, clipped, e.below)
+
+    @cached_property
+    def _mixture(self) -> mixture.Mixture:
+        return maps.with_corrections(self.evidence.mixture, self._maps.clipped)
+
+    @cached_property
+    def _outline(self) -> tuple[NDArray | None, Edge | None]:
+        if self.selection is None:
+            return None, None
+        splits, seen = self.evidence.mixture.keeps_white, (self.picture, self.selection, self.reference, self.white)
+        return refine_outline(*seen, splits=splits, spill=spill_weights(*seen) if self.spill and splits else None)
+
+    @property
+    def mask(self) -> NDArray | None:
+        """(height, width) coverage that is recolored: the selection, its outline refined, with the spill if asked."""
+        return self._outline[0]
+
+    @property
     def edge(self) -> Edge | None:
-        """The product's share of the light in pixels that the mask covers in part."""
-        return None if self.mask is None else unmix_edge(self.picture, self.mask)
+        """The product's share of the light in the pixels of its outline."""
+        return self._outline[1]
 
     @cached_property
     def _coefficients(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        return dichromatic.fit(self.picture.linear(), self.reference, self.white, self.model)
+        rows = np.stack([self._mixture.coefficient(term) for term in ("body", "white")]).astype(np.float32)
+        both = self.picture.linear() @ rows[:, :3].T
+        if self.extra is not None:
+            both += self.extra @ rows[:, 3:].T
+        return both[..., 0], both[..., 1]
 
     @property
     def A(self) -> NDArray[np.float32]:  # noqa: N802, the paper's symbol
@@ -141,7 +204,14 @@ class Analysis:
     @cached_property
     def residual(self) -> NDArray[np.float32]:
         """(height, width) float32 >= 0: distance from the model in linear RGB; Eq. (32)."""
-        return dichromatic.residual(self.picture.linear(), self.reference, self.white, self.model)
+        return self._left_over(self.picture.linear(), self.extra)
+
+    def _left_over(self, linear: NDArray, extra: NDArray | None) -> NDArray[np.float32]:
+        matrix = self._mixture.left_over.astype(np.float32)
+        left = linear @ matrix[:, :3].T
+        if extra is not None:
+            left += extra @ matrix[:, 3:].T
+        return np.linalg.norm(left, axis=-1)
 
     @cached_property
     def noise(self) -> stability.Noise:
@@ -172,8 +242,24 @@ class Analysis:
             ),
             self.noise,
             self.white if target_white is None else dichromatic.as_white(target_white),
-            self.mask,
+            self.selection,
+            self.extra,
         )
+
+    def thinned(self, step: int) -> Analysis:
+        """Return the same findings on every step-th pixel of every step-th row, for small maps."""
+        if step == 1:
+            return self
+
+        def thin[T: NDArray | None](values: T) -> T:
+            return values if values is None else values[::step, ::step]  # type: ignore[return-value]
+
+        picture = Picture(thin(self.picture.pixels), self.picture.curve)
+        small = replace(self, picture=picture, selection=thin(self.selection))
+        # What was found in the whole photo is not to be found again in the small one.
+        kept = {"extra": thin(self.extra), "noise": self.noise, "_maps": self._maps, "_mixture": self._mixture}
+        small.__dict__.update(kept, _outline=(thin(self.mask), None))
+        return small
 
     @cached_property
     def report(self) -> dict[str, object]:
@@ -181,8 +267,8 @@ class Analysis:
 
         The residual is on the paper's scale of 0..255 (it states 0.27 for a plastic cup), over the region.
         """
-        pixels = self.picture.sample(_SAMPLE, self.mask)
-        left = dichromatic.residual(pixels, self.reference, self.white, self.model) * 255
+        pixels = self.picture.sample(_SAMPLE, self.selection, self.extra)
+        left = self._left_over(pixels[:, :3], None if self.extra is None else pixels[:, 3:]) * 255
         clip = self.picture.clip_level
         return {
             "model": self.model,
@@ -192,8 +278,11 @@ class Analysis:
             "noise_gain": float(self.noise_gain) if np.isfinite(self.noise_gain) else None,
             "residual_mean": float(left.mean()),
             "residual_p95": float(np.quantile(left, 0.95)),
-            "clipped_share": float((pixels.max(axis=1) >= clip).mean()),
-            "covered_share": 1.0 if self.mask is None else float(as_weights(self.mask).mean(dtype=np.float64)),
+            "clipped_share": float((pixels[:, :3].max(axis=1) >= clip).mean()),
+            "evidence": {name: float(value) for name, value in self.evidence.figures.items()},
+            "covered_share": 1.0
+            if self.selection is None
+            else float(as_weights(self.selection).mean(dtype=np.float64)),
             "warnings": list(self.warnings),
         }
 
@@ -204,6 +293,7 @@ def analyze(
     reference: ArrayLike | Sequence[int] | None = None,
     mask: ArrayLike | None = None,
     model: str = "auto",
+    spill: bool = False,
 ) -> Analysis:
     """Find how a product's color is made up in a photo, so that it can be recolored.
 
@@ -215,13 +305,18 @@ def analyze(
         (3,) response to a perfect white diffuser under the photo's light; None for ones, a photo that is
         white-balanced.
     reference
-        (x, y) pixel of the product, matte and lit (a small window around it is averaged); or (r, g, b) linear;
-        None to find the product's matte color in the mask.
+        (x, y) pixel of the product, lit and not in a highlight: a small window around it is averaged, and the gloss
+        found in it is left out. Or (r, g, b) linear, which is taken as it is; None to find the product's matte
+        color in the mask.
     mask
         (height, width) coverage of the product, 0..1 (or bool, or integer codes); None for the whole picture.
     model
-        "dichromatic": body and surface reflection. "body": body reflection alone, for products that are almost
-        grey. "auto": dichromatic unless the reference is so near to grey that the two cannot be told apart.
+        "auto": the simplest that leaves nothing beyond the noise, see `selection`. Or one of `mixture.MODELS`:
+        "dichromatic", body and surface reflection; "body", body reflection alone; "regularized", "bounce", "lights",
+        "metal".
+    spill
+        Recolor what shows of the product outside the mask too: its rim where the mask is a few pixels too tight, and
+        the light that it throws on a neutral surround (:func:`compositing.spill_weights`).
 
     Returns
     -------
@@ -248,25 +343,16 @@ def analyze(
             "The white and the reference are the same color: pick the product for the reference, and a white or grey "
             "card for the white."
         )
+    evidence = choose(picture, found.color, w, m, found.pixel, model)
+    if model in ("auto", "bounce") and found.gloss > 0:
+        # Folds are more saturated than a matte ridge, which makes it look glossy beside them.
+        read = Reference(found.color + found.gloss * w, found.pixel)
+        folds = choose(picture, read.color, w, m, read.pixel, model)
+        if folds.mixture.model == "bounce" and not folds.mixture.keeps_white:
+            found, evidence = read, folds
     gain = stability.noise_gain(found.color, w)
-    warnings = []
-    chosen = model
-    if model == "auto":
-        chosen = "dichromatic" if gain <= LARGEST_NOISE_GAIN else "body"
-    if gain > LARGEST_NOISE_GAIN:
-        remedy = (
-            "the body model is used and highlights take the body color"
-            if chosen == "body"
-            else f"noise grows {gain:.0f} times; use the model 'auto' or 'body'"
-        )
-        warnings.append(
-            f"The product is almost the color of the light, so highlights and body cannot be told apart: {remedy}. "
-            "A photo of a colored sample gives a better result."
-        )
-    if chosen == "dichromatic":
-        dichromatic.projector(found.color, w)  # says in words if it is grey to the last digit
-    warnings += _warnings(picture, found, w, m)
-    return Analysis(picture, w, found.color, found.pixel, m, chosen, gain, tuple(warnings))
+    warnings = reference_warnings(found, w, model) + _evidence_warnings(evidence) + _region_warnings(picture, m)
+    return Analysis(picture, w, found.color, found.pixel, m, evidence, gain, tuple(warnings), found.gloss, spill)
 
 
 def _check_finite(picture: Picture) -> None:
@@ -282,19 +368,68 @@ def _find_reference(picture: Picture, reference: ArrayLike | None, white: NDArra
     except ValueError:
         raise ReferenceColorError(f"Reference {reference!r} is not understood: give x, y or r, g, b.") from None
     if given.shape == (2,):
-        return reference_at(picture, given, white, mask)
+        return matte_at(picture, given, white, mask)
     return Reference(dichromatic.as_reference(given))
 
 
-def _warnings(picture: Picture, found: Reference, white: NDArray, mask: NDArray | None) -> list[str]:
+def reference_warnings(found: Reference, white: NDArray, model: str = "auto") -> list[str]:
+    """Sentences for the user on a reference color: almost grey, glossy or dark; each with a remedy.
+
+    Parameters
+    ----------
+    found
+        From :func:`reference.matte_at`.
+    white
+        (3,) white of the light.
+    model
+        That is asked for.
+    """
     said = []
+    gain = stability.noise_gain(found.color, white)
+    if gain > LARGEST_NOISE_GAIN:
+        remedy = (
+            f"noise grows {gain:.0f} times; use the model 'auto' or 'body'"
+            if model == "dichromatic"
+            else "highlights are kept only as far as the noise allows, and else take the body color"
+        )
+        said.append(
+            f"The product is almost the color of the light, so highlights and body are hard to tell apart: {remedy}. "
+            "A photo of a colored sample gives a better result."
+        )
     if found.gloss > _GLOSSY:
         said.append(
-            f"The reference pixel is glossy (about {found.gloss:.0%} of the white): click a matte part, or leave the "
-            "reference out to have one found."
+            f"The reference pixel is glossy (about {found.gloss:.0%} of the white): the target is given to the matte "
+            "color under it, and the gloss stays on top; click a matte part if the pixel shall read the target."
         )
     if (found.color / white).max() < 4 * DARK:
         said.append("The reference is dark, so its color is uncertain: click a better lit part.")
+    return said
+
+
+def _evidence_warnings(evidence: Evidence) -> list[str]:
+    """Sentences on what the chosen model does not explain, each with a remedy."""
+    chosen, figures = evidence.mixture.model, evidence.figures
+    if chosen == "lights":
+        return [
+            "Light of more than one color falls on the product, or it is metal: its highlights are a guess; use the "
+            "model 'metal' if it is, or even light for another photo."
+        ]
+    if chosen == "metal" and figures:
+        return [
+            "The product looks like metal, or lies in light of more than one color without gloss: each channel is "
+            "scaled by itself; check the result against a sample."
+        ]
+    left = max(figures.get("negative_gloss", 0.0), figures.get("residual", 0.0))
+    if chosen in ("dichromatic", "regularized") and left > _UNEXPLAINED:
+        return [
+            f"{left:.0%} of the product has colors that gloss, shading and folds do not explain: silk, translucent or "
+            "patterned material comes out with errors; check the result against a sample, or select less."
+        ]
+    return []
+
+
+def _region_warnings(picture: Picture, mask: NDArray | None) -> list[str]:
+    said = []
     if mask is not None and np.count_nonzero(mask) < _FEWEST_PIXELS * mask.size:
         said.append(
             f"The region covers only {np.count_nonzero(mask)} of {mask.size} pixels: if that is not all of the "

@@ -103,6 +103,33 @@ _CONES = {
 }
 
 
+# B. Ottosson, "A perceptual color space for image processing", 2020: XYZ to cones, and their cube roots to Oklab.
+_OKLAB_CONES = np.array(
+    [
+        [0.8189330101, 0.3618667424, -0.1288597137],
+        [0.0329845436, 0.9293118715, 0.0361456387],
+        [0.0482003018, 0.2643662691, 0.6338517070],
+    ]
+)
+_OKLAB = np.array(
+    [
+        [0.2104542553, 0.7936177850, -0.0040720468],
+        [1.9779984951, -2.4285922050, 0.4505937099],
+        [0.0259040371, 0.7827717662, -0.8086757660],
+    ]
+)
+
+
+def xyz_to_oklab(xyz: ArrayLike) -> NDArray:
+    """XYZ (..., 3) under D65, Y = 1 for white, to Oklab with L of 0..1 (Ottosson 2020)."""
+    return _times(np.cbrt(_times(xyz, _OKLAB_CONES)), _OKLAB)
+
+
+def oklab_to_xyz(oklab: ArrayLike) -> NDArray:
+    """Oklab (..., 3) to XYZ under D65; the inverse of `xyz_to_oklab`."""
+    return _times(_times(oklab, np.linalg.inv(_OKLAB)) ** 3, np.linalg.inv(_OKLAB_CONES))
+
+
 def adaptation_matrix(source: ArrayLike, destination: ArrayLike, method: Adaptation = "cat16") -> NDArray[np.float64]:
     """Von Kries adaptation of XYZ from one white to another, complete.
 
@@ -159,6 +186,12 @@ def linear_to_xyz(rgb: ArrayLike, space: RGBSpace) -> NDArray:
 def xyz_to_linear(xyz: ArrayLike, space: RGBSpace) -> NDArray:
     """XYZ (..., 3) to linear RGB of a space, not adapted, not clipped."""
     return _times(xyz, space.from_xyz)
+
+
+def conversion_matrix(source: RGBSpace, target: RGBSpace) -> NDArray[np.float64]:
+    """(3, 3): linear RGB of one space to that of another, white to white by Bradford, as ICC profiles have it."""
+    adapted = adaptation_matrix(source.white, target.white, "bradford")
+    return target.from_xyz @ adapted @ source.to_xyz
 
 
 def linear_to_lab(rgb: ArrayLike, space: RGBSpace, white: ArrayLike | None = None) -> NDArray:

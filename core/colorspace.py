@@ -40,6 +40,12 @@ class RGBSpace:
         """(3,) XYZ of RGB (1, 1, 1), with Y = 1."""
         return self.to_xyz.sum(axis=1)
 
+    @cached_property
+    def chromaticities(self) -> tuple[float, ...]:
+        """(x, y) of red, green, blue and white, eight numbers."""
+        columns = np.column_stack([self.to_xyz, self.white])
+        return tuple(float(v) for v in (columns[:2] / columns.sum(axis=0)).T.ravel())
+
     def with_curve(self, curve: transfer.Curve, name: str | None = None) -> RGBSpace:
         """Return the same primaries under another transfer curve."""
         return RGBSpace(name or self.name, self.to_xyz, curve)

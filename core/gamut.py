@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Literal
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from . import colorimetry
+from .colorspace import SRGB, RGBSpace
 
 # How far outside 0..1 a linear channel may lie before the pixel counts as out of gamut. Below this it is noise of
 # the picture, and clipping it is invisible.
@@ -53,3 +59,122 @@ def fit_to_gamut(linear: NDArray[np.float32]) -> int:
         room = np.where(away > 0, (1 - grey) / away, np.where(away < 0, -grey / away, np.inf))
     linear[outside] = grey + np.minimum(room.min(axis=1), 1)[:, None] * away
     return len(outside)
+
+
+type Method = Literal["lab", "oklch"]
+
+
+@dataclass(frozen=True, eq=False)
+class Compromise:
+    """The colors of a space that are nearest to given ones.
+
+    Attributes
+    ----------
+    linear
+        (..., 3) linear RGB in 0..1; those that were inside, as they were.
+    difference
+        (...) CIEDE2000 that they are away.
+    """
+
+    linear: NDArray[np.float64]
+    difference: NDArray[np.float64]
+
+
+# Lightnesses that are tried, and halvings of each search.
+_LIGHTNESSES = 33
+_HALVINGS = 24
+
+
+def nearest(linear: ArrayLike, space: RGBSpace = SRGB, method: Method = "lab") -> Compromise:
+    """Find the nearest color that a space holds, by CIEDE2000 among the lightnesses and chromas of the same hue.
+
+    For colors that a person chose, such as targets: it takes a hundred times as long as :func:`fit_to_gamut`, and
+    keeps more of the chroma by giving up some lightness as well.
+
+    Parameters
+    ----------
+    linear
+        (..., 3) linear RGB of the space.
+    space
+        The space.
+    method
+        Whose hue is kept: that of CIELAB under the white of the space, or of Oklch, which turns blues less to violet.
+
+    Returns
+    -------
+    Compromise
+    """
+    given = np.asarray(linear, np.float64)
+    pixels = given.reshape(-1, 3)
+    found = np.clip(pixels, 0, 1)
+    outside = np.flatnonzero(out_of_gamut(pixels))
+    if outside.size:
+        found[outside] = _nearest(pixels[outside], space, method)
+    inside = np.setdiff1d(np.arange(len(pixels)), outside)
+    found[inside] = pixels[inside]
+    labs = (colorimetry.linear_to_lab(colors, space) for colors in (pixels, found))
+    return Compromise(found.reshape(given.shape), colorimetry.delta_e_2000(*labs).reshape(given.shape[:-1]))
+
+
+def _nearest(pixels: NDArray, space: RGBSpace, method: Method) -> NDArray[np.float64]:
+    """(n, 3) nearest colors to those outside: first along a grid of lightnesses, then between its neighbors."""
+    to_d65 = colorimetry.adaptation_matrix(space.white, SRGB.white)
+    if method == "lab":
+        given, top = colorimetry.lab_to_lch(colorimetry.linear_to_lab(pixels, space)), 100.0
+    else:
+        given, top = colorimetry.lab_to_lch(colorimetry.xyz_to_oklab(pixels @ (to_d65 @ space.to_xyz).T)), 1.0
+    _, C0, hue = given.T
+
+    def linear(L: NDArray, C: NDArray) -> NDArray:
+        lab = colorimetry.lch_to_lab(np.stack([L, C, np.broadcast_to(hue, L.shape)], axis=-1))
+        if method == "lab":
+            return colorimetry.lab_to_linear(lab, space)
+        return colorimetry.oklab_to_xyz(lab) @ np.linalg.inv(to_d65 @ space.to_xyz).T
+
+    def chroma(L: NDArray) -> NDArray:
+        """The most chroma, up to the given one, that the space has at a lightness."""
+        low, high = np.zeros_like(L), np.broadcast_to(C0, L.shape).copy()
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            rgb = linear(L, middle)
+            fits = (rgb.min(axis=-1) >= 0) & (rgb.max(axis=-1) <= 1)
+            low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+        return low
+
+    wanted = colorimetry.linear_to_lab(pixels, space)
+
+    def distance(L: NDArray) -> NDArray:
+        return colorimetry.delta_e_2000(wanted, colorimetry.linear_to_lab(linear(L, chroma(L)), space))
+
+    grid = np.linspace(0, top, _LIGHTNESSES)[:, None] + np.zeros_like(C0)
+    best = grid[np.argmin(distance(grid), axis=0), np.arange(len(C0))]
+    low, high = np.clip(best - top / (_LIGHTNESSES - 1), 0, top), np.clip(best + top / (_LIGHTNESSES - 1), 0, top)
+    for _ in range(_HALVINGS):  # thirds: the distance has one valley there
+        third = (high - low) / 3
+        left = distance(low + third) < distance(high - third)
+        low, high = np.where(left, low, low + third), np.where(left, high - third, high)
+    lightness = (low + high) / 2
+    return np.clip(linear(lightness, chroma(lightness)), 0, 1)
+
+
+def marked(linear: NDArray[np.float32], color: ArrayLike = (1.0, 0.0, 1.0)) -> tuple[NDArray[np.float32], float]:
+    """Show where a picture leaves the gamut.
+
+    Parameters
+    ----------
+    linear
+        (height, width, 3) linear RGB. Not modified.
+    color
+        (3,) of the marking.
+
+    Returns
+    -------
+    picture
+        The same with every pixel outside in that color.
+    share
+        Share of those pixels, 0..1.
+    """
+    outside = out_of_gamut(linear)
+    picture = np.array(linear, np.float32)
+    picture[outside] = np.asarray(color, np.float32)
+    return picture, float(outside.mean()) if outside.size else 0.0

@@ -77,3 +77,55 @@ def mean_nearby(
         mean[part] = sums / np.maximum(total, 1)[:, None]
         found[part] = total > 0
     return mean, found
+
+
+def rings(*radii: tuple[float, ...]) -> list[NDArray[np.intp]]:
+    """Offsets (n, 2), rows and columns, of points on circles: one array for each group of radii."""
+    groups = []
+    for group in radii:
+        angles = 2 * np.pi * (np.arange(12) + 0.5 * np.arange(len(group))[:, None]) / 12
+        circles = np.asarray(group)[:, None, None] * np.stack([np.sin(angles), np.cos(angles)], axis=-1)
+        groups.append(np.unique(np.rint(circles).astype(np.intp).reshape(-1, 2), axis=0))
+    return groups
+
+
+def mean_at(
+    picture: Picture, wanted: NDArray[np.bool_], rows: NDArray, columns: NDArray, offsets: list[NDArray[np.intp]]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Mean color, around each position, of the pixels that are wanted.
+
+    Parameters
+    ----------
+    picture
+        The photo.
+    wanted
+        (height, width) which pixels count.
+    rows, columns
+        (n,) positions.
+    offsets
+        Groups of (m, 2) where to look: the first group in which any pixel counts is taken.
+
+    Returns
+    -------
+    mean
+        (n, 3) linear RGB, 0 where there is none.
+    found
+        (n,) whether any wanted pixel was there.
+    """
+    height, width = picture.shape
+    mean, found = np.zeros((len(rows), 3)), np.zeros(len(rows), bool)
+    for group in offsets:
+        missing = np.flatnonzero(~found)
+        chunk = max(1, 400_000 // len(group))
+        for start in range(0, len(missing), chunk):
+            at = missing[start : start + chunk]
+            y, x = rows[at, None] + group[:, 0], columns[at, None] + group[:, 1]
+            inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
+            counts = inside & wanted[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)]
+            chosen = np.nonzero(counts)
+            light = picture.at(y[chosen], x[chosen])
+            total = counts.sum(axis=1)
+            sums = np.stack([np.bincount(chosen[0], light[:, k], minlength=len(at)) for k in range(3)], axis=1)
+            mean[at] = sums / np.maximum(total, 1)[:, None]
+            found[at] = total > 0
+    return mean, found

@@ -72,20 +72,29 @@ class Picture:
         """(n, 3) linear RGB of n pixels."""
         return transfer.decode(self.pixels[rows, columns, :3], self.curve)
 
-    def sample(self, most: int, mask: NDArray | None = None) -> NDArray[np.float32]:
-        """(n, 3) linear pixels on a regular grid, about `most` of them or all; with a mask, well inside it only."""
+    def sample(self, most: int, mask: NDArray | None = None, extra: NDArray | None = None) -> NDArray[np.float32]:
+        """(n, 3) linear pixels on a regular grid, about `most` of them or all; with a mask, well inside it only.
+
+        With `extra`, an array (height, width, k), its channels come after the colors: (n, 3 + k).
+        """
         height, width = self.shape
+
+        def part(rows: slice = slice(None), columns: slice = slice(None)) -> NDArray[np.float32]:
+            linear = self.linear(rows, columns)
+            return linear if extra is None else np.concatenate([linear, extra[rows, columns]], axis=2, dtype=np.float32)
+
         if mask is None:
             step = _step(height * width, most)
-            return self.linear(slice(step // 2, None, step), slice(step // 2, None, step)).reshape(-1, 3)
+            some = part(slice(step // 2, None, step), slice(step // 2, None, step))
+            return some.reshape(-1, some.shape[2])
         weights = as_weights(mask)
         # A mask that is soft all over is taken where it is strongest.
         inside = weights > 0.95 * min(1.0, float(weights.max()))
         step = _step(int(np.count_nonzero(inside)), most)
         grid = inside[step // 2 :: step, step // 2 :: step]
         if not grid.any():
-            return self.linear()[inside].reshape(-1, 3)
-        return self.linear(slice(step // 2, None, step), slice(step // 2, None, step))[grid]
+            return part()[inside]
+        return part(slice(step // 2, None, step), slice(step // 2, None, step))[grid]
 
     @cached_property
     def overview(self) -> NDArray[np.float32]:
@@ -169,6 +178,14 @@ def as_weights(mask: NDArray) -> NDArray[np.float32]:
     if mask.dtype.kind == "u":
         return mask.astype(np.float32) * np.float32(1 / np.iinfo(mask.dtype).max)
     return mask.astype(np.float32, copy=False)
+
+
+def bounding_box(mask: NDArray) -> tuple[slice, slice]:
+    """(rows, columns) that hold everything a mask covers; empty slices if that is nothing."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if len(rows) == 0:
+        return slice(0, 0), slice(0, 0)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def _size(shape: tuple[int, ...]) -> str:

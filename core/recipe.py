@@ -19,10 +19,12 @@ from .errors import MaskError, RecipeError, TargetError
 from .picture import Picture, as_mask
 from .recolor import RegionMatrix
 from .reference import white_at, white_from_highlights
-from .region import region_at
+from .region import region_from_clicks
 from .swatches import Swatch
 
 MEANINGS = ("reference", "product")
+OBSERVERS = ("1931", "1964")
+ADAPTATIONS = ("cat16", "bradford")
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,10 @@ class Region:
         `read_mask` of `prepare`, an array, or None for the whole picture.
     click
         (x, y) that chooses the region, when it is not the reference pixel.
+    added, removed
+        Further clicks, whose materials are added to a clicked region or taken away from it.
     tolerance
-        Of a clicked region, see :func:`region.region_at`.
+        Of a clicked region, see :func:`region.region_from_clicks`.
     meaning
         "reference": the reference pixel shall have the target color. "product": the product shall have the target
         reflectance, in the light that falls on the reference.
@@ -50,6 +54,8 @@ class Region:
         it the white must have been read where the reference is.
     model, residual
         See :func:`analysis.analyze` and :meth:`analysis.Analysis.matrix`.
+    name
+        What the user calls it; colorways in recipe files and warnings name regions by it.
     """
 
     target: Swatch | None = None
@@ -61,6 +67,25 @@ class Region:
     source: Swatch | None = None
     model: str = "auto"
     residual: str | float = "fade"
+    name: str = ""
+    added: tuple[tuple[int, int], ...] = ()
+    removed: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class Colorway:
+    """A named set of targets for the regions of a photo.
+
+    Attributes
+    ----------
+    name
+        As shown to the user, and in file names.
+    targets
+        One for each region; None for a region that keeps the color it has in the photo.
+    """
+
+    name: str
+    targets: tuple[Swatch | None, ...]
 
 
 @dataclass(frozen=True)
@@ -80,6 +105,8 @@ class Recipe:
         The new light, as (r, g, b) or by name; None for an unchanged light.
     observer, camera, adaptation
         For swatches and illuminants, see :meth:`swatches.Swatch.to_linear`.
+    colorways
+        Sets of targets that the same photo is wanted in, besides those of the regions themselves.
     """
 
     regions: tuple[Region, ...] = field(default_factory=lambda: (Region(),))
@@ -89,6 +116,18 @@ class Recipe:
     observer: str = "1931"
     camera: str | None = None
     adaptation: colorimetry.Adaptation = "cat16"
+    colorways: tuple[Colorway, ...] = ()
+
+    def footing(self) -> Recipe:
+        """Return the part that the look at the photo depends on; the rest may change without another look."""
+        plain = [
+            replace(region, target=_ANY, meaning=MEANINGS[0], source=None, residual="fade", name="")
+            for region in self.regions
+        ]
+        return replace(self, regions=tuple(plain), illuminant=None, adaptation="cat16", colorways=())
+
+
+_ANY = Swatch.from_linear((0.5, 0.5, 0.5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,16 +178,56 @@ class Prepared:
         chosen: Sequence[Swatch | None] = swatches or [None] * len(self.analyses)
         if len(chosen) != len(self.analyses):
             raise RecipeError(f"{len(chosen)} targets are given for {len(self.analyses)} regions: give one for each.")
-        return [
-            analysis.region(self.target(k, chosen[k]), self.target_white, self.recipe.regions[k].residual)
-            for k, analysis in enumerate(self.analyses)
-        ]
+        return [self._matrix(k, swatch) for k, swatch in enumerate(chosen)]
+
+    def _matrix(self, index: int, swatch: Swatch | None) -> RegionMatrix:
+        region, analysis = self.recipe.regions[index], self.analyses[index]
+        if swatch is None and region.target is None and np.array_equal(self.white, self.target_white):
+            return RegionMatrix(np.eye(3), analysis.mask)  # kept to the last bit, whatever the model
+        return analysis.region(self.target(index, swatch), self.target_white, region.residual)
+
+    def asking(self, recipe: Recipe) -> Prepared:
+        """Return the same look at the photo for a recipe of the same footing: other targets, another new light."""
+        return replace(self, recipe=recipe, target_white=_target_white(recipe, self.space, self.white))
+
+    def for_colorway(self, colorway: Colorway) -> Prepared:
+        """Return the same analyses with the targets of a colorway, without another look at the photo."""
+        return replace(self, recipe=with_colorway(self.recipe, colorway))
 
     @property
     def warnings(self) -> list[str]:
         """Sentences for the user, of all regions."""
         many = len(self.analyses) > 1
-        return [f"Region {k + 1}: {w}" if many else w for k, a in enumerate(self.analyses) for w in a.warnings]
+        names = [f"Region '{r.name}'" if r.name else f"Region {k + 1}" for k, r in enumerate(self.recipe.regions)]
+        pairs = zip(names, self.analyses, strict=True)
+        return [f"{name}: {warning}" if many else warning for name, a in pairs for warning in a.warnings]
+
+
+def check(recipe: Recipe) -> None:
+    """Find what is wrong with a recipe before there is a photo.
+
+    Raises
+    ------
+    DyehouseError
+        The first problem, if there is one.
+    """
+    if not recipe.regions:
+        raise RecipeError("The recipe has no region: give at least one.")
+    for given, known, what in (
+        (recipe.adaptation, ADAPTATIONS, "Adaptation"),
+        (recipe.observer, OBSERVERS, "Observer"),
+    ):
+        if given not in known:
+            raise RecipeError(f"{what} '{given}' is not known: use {' or '.join(known)}.")
+    if recipe.camera is not None:
+        spectra.camera_sensitivities(recipe.camera)  # says in words if there is none
+    for region in recipe.regions:
+        if region.meaning not in MEANINGS:
+            raise RecipeError(f"Meaning '{region.meaning}' is not known: use one of {', '.join(MEANINGS)}.")
+    if recipe.illuminant is None and not recipe.colorways and all(r.target is None for r in recipe.regions):
+        raise TargetError("There is no target color and no new illuminant: give at least one of them.")
+    for colorway in recipe.colorways:
+        with_colorway(recipe, colorway)  # says in words if it does not fit
 
 
 def prepare(
@@ -186,22 +265,8 @@ def prepare(
     DyehouseError
         If any part of the recipe cannot be used on this photo.
     """
-    if not recipe.regions:
-        raise RecipeError("The recipe has no region: give at least one.")
-    for given, known, what in (
-        (recipe.adaptation, ("cat16", "bradford"), "Adaptation"),
-        (recipe.observer, ("1931", "1964"), "Observer"),
-    ):
-        if given not in known:
-            raise RecipeError(f"{what} '{given}' is not known: use {' or '.join(known)}.")
-    if recipe.camera is not None:
-        spectra.camera_sensitivities(recipe.camera)  # says in words if there is none
-    for region in recipe.regions:
-        if region.meaning not in MEANINGS:
-            raise RecipeError(f"Meaning '{region.meaning}' is not known: use one of {', '.join(MEANINGS)}.")
-        if region.target is None and recipe.illuminant is None:
-            raise TargetError("There is no target color and no new illuminant: give at least one of them.")
-    white, source = _white(picture, recipe, space, photo_white)
+    check(recipe)
+    white, source = white_asked(picture, recipe, space, photo_white)
     masks = [_mask(picture, region, white, alpha, read_mask) for region in recipe.regions]
     if recipe.white == "highlights":
         white, confidence = white_from_highlights(picture, light_colors(space), masks[0])
@@ -221,9 +286,13 @@ def light_colors(space: RGBSpace) -> NDArray[np.float64]:
     return np.array([w for w in whites if w.min() > 0])
 
 
-def _white(
+def white_asked(
     picture: Picture, recipe: Recipe, space: RGBSpace, photo_white: ArrayLike | None
 ) -> tuple[NDArray[np.float64], str]:
+    """(3,) white that a recipe gives a photo, and where it comes from in words; ones for one to be found in highlights.
+
+    Parameters and errors as for :func:`prepare`.
+    """
     if not 0 < recipe.gray <= 1:
         raise RecipeError(f"Reflectance {recipe.gray} of the card is not in 0..1: a grey card has 0.18.")
     asked = recipe.white
@@ -268,7 +337,7 @@ def _mask(
         click = region.click or region.reference
         if click is None or len(click) != 2:
             raise MaskError("A clicked region needs a pixel of the product: give the reference as x,y.")
-        return region_at(picture, click, white, region.tolerance)
+        return region_from_clicks(picture, click, region.added, region.removed, white, region.tolerance)
     if asked == "alpha":
         if alpha is None:
             raise MaskError("The photo has no alpha to take the mask from: give a mask file, or click the product.")
@@ -279,9 +348,17 @@ def _mask(
     return as_mask(read_mask(asked), picture.shape)
 
 
-def with_target(recipe: Recipe, *swatches: Swatch) -> Recipe:
+def with_target(recipe: Recipe, *swatches: Swatch | None) -> Recipe:
     """Return the same recipe with other targets, one for each region."""
     if len(swatches) != len(recipe.regions):
         raise RecipeError(f"{len(swatches)} targets are given for {len(recipe.regions)} regions: give one for each.")
     pairs = zip(recipe.regions, swatches, strict=True)
     return replace(recipe, regions=tuple(replace(region, target=swatch) for region, swatch in pairs))
+
+
+def with_colorway(recipe: Recipe, colorway: Colorway) -> Recipe:
+    """Return the same recipe with the targets of a colorway."""
+    try:
+        return with_target(recipe, *colorway.targets)
+    except RecipeError as error:
+        raise RecipeError(f"Colorway '{colorway.name}': {error}") from None

@@ -1,7 +1,8 @@
 """The one path from pixels to recolored pixels, which every front end takes.
 
-Under the models of this package recoloring a region is a 3x3 matrix on linear light. The work is done in bands
-that fit the cache, on all cores, and only inside the region's bounding box.
+Under the plain models recoloring a region is a 3x3 matrix on linear light; under the others the same matrix with a
+few more columns, for correction maps that the analysis made once. The work is done in bands that fit the cache, on
+all cores, and only inside the region's bounding box.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 from . import gamut, transfer
 from .compositing import Edge
 from .errors import ImageError
-from .picture import Picture, as_weights, bands
+from .picture import Picture, as_weights, bands, bounding_box
 
 # Pixels in one matrix product: under the size from which OpenBLAS spreads a product over threads, which is many
 # times slower when another process uses the cores.
@@ -35,26 +36,25 @@ class RegionMatrix:
     Attributes
     ----------
     matrix
-        (3, 3) linear RGB to linear RGB.
+        (3, 3 + n): the pixel's linear RGB and its n corrections to linear RGB.
     mask
         (height, width) checked coverage, or None for the whole picture.
     edge
         The product's share in pixels of soft coverage, or None for plain blending.
+    extra
+        (height, width, n) float32 or float16 corrections, 0 where the plain model is enough; None for n = 0. They
+        belong to the product alone: in pixels of soft coverage they count by it.
     """
 
     matrix: NDArray[np.float64]
     mask: NDArray | None = None
     edge: Edge | None = None
+    extra: NDArray | None = None
 
     @cached_property
     def box(self) -> tuple[slice, slice] | None:
         """(rows, columns) that hold the region; None for the whole picture."""
-        if self.mask is None:
-            return None
-        rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))
-        if len(rows) == 0:
-            return slice(0, 0), slice(0, 0)
-        return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+        return None if self.mask is None else bounding_box(self.mask)
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,7 @@ def recolor(
     dtype: DTypeLike = np.float32,
     out: NDArray | None = None,
     threads: int | None = None,
+    convert: NDArray | None = None,
 ) -> tuple[NDArray, Shares]:
     """Apply the regions' matrices.
 
@@ -99,6 +100,8 @@ def recolor(
         pixels if those may be lost. None for a new (height, width, 3).
     threads
         None for one per core.
+    convert
+        (3, 3) linear RGB of the photo to that of the result, for all of the picture; None for the same space.
 
     Returns
     -------
@@ -112,7 +115,7 @@ def recolor(
     ImageError
         If the picture has NaN or infinite pixels.
     """
-    job = Recoloring(picture, regions, curve=curve, dtype=dtype, out=out, threads=threads)
+    job = Recoloring(picture, regions, curve=curve, dtype=dtype, out=out, threads=threads, convert=convert)
     for _ in job.rows():
         pass
     return job.out, job.shares
@@ -123,7 +126,7 @@ class Recoloring:
 
     Parameters
     ----------
-    picture, regions, curve, dtype, out, threads
+    picture, regions, curve, dtype, out, threads, convert
         As for :func:`recolor`.
 
     Attributes
@@ -143,6 +146,7 @@ class Recoloring:
         dtype: DTypeLike = np.float32,
         out: NDArray | None = None,
         threads: int | None = None,
+        convert: NDArray | None = None,
     ) -> None:
         self._dtype = np.dtype(dtype)
         self._height, self._width = picture.shape
@@ -150,10 +154,10 @@ class Recoloring:
         self.out = np.empty((self._height, self._width, 3), self._dtype) if out is None else out
         self.shares = Shares(0, 0.0)
         self._rows, columns = _bounds(regions, self._height, self._width)
-        if self._dtype != picture.pixels.dtype or (curve or transfer.LINEAR) != picture.curve:
+        if self._dtype != picture.pixels.dtype or (curve or transfer.LINEAR) != picture.curve or convert is not None:
             # Everything must be encoded anew.
             self._rows, columns = slice(0, self._height), slice(0, self._width)
-        self._job = _Job(picture, regions, columns, curve or transfer.LINEAR, self._dtype, self.out)
+        self._job = _Job(picture, regions, columns, curve or transfer.LINEAR, self._dtype, self.out, convert)
 
     def rows(self) -> Iterator[int]:
         """Do the work; yields the number of rows from the top that are done, growing to the height.
@@ -211,20 +215,23 @@ class _Job:
         curve: transfer.Curve,
         dtype: np.dtype,
         out: NDArray,
+        convert: NDArray | None = None,
     ) -> None:
         self.picture, self.regions, self.columns, self.out = picture, regions, columns, out
         self.curve, self.dtype = curve, dtype
         self.integer, self.floats = dtype.kind == "u", picture.pixels.dtype.kind == "f"
         # Linear float32 needs no encoding: the result is made where it belongs.
-        self.same_codes = dtype == picture.pixels.dtype and curve == picture.curve
+        self.same_codes = dtype == picture.pixels.dtype and curve == picture.curve and convert is None
         # Float codes do not survive decoding and encoding to the last bit: outside the regions they are put back.
         self.restore = (
             self.same_codes and self.floats and not curve.is_linear and all(r.mask is not None for r in regions)
         )
         self.direct = dtype == np.float32 and curve.is_linear and not np.shares_memory(out, picture.pixels)
+        self.convert = None if convert is None else np.ascontiguousarray(convert.T, np.float32)
         # A pixel times the transposed matrix, so that (n, 3) rows need no turning round.
-        self.matrices = [np.ascontiguousarray(r.matrix.T, np.float32) for r in regions]
-        self.changes = [np.ascontiguousarray((r.matrix - np.eye(3)).T, np.float32) for r in regions]
+        self.matrices = [np.ascontiguousarray(r.matrix[:, :3].T, np.float32) for r in regions]
+        self.changes = [np.ascontiguousarray((r.matrix[:, :3] - np.eye(3)).T, np.float32) for r in regions]
+        self.corrections = [np.ascontiguousarray(r.matrix[:, 3:].T, np.float32) for r in regions]
 
     def run(self, parts: list[slice]) -> tuple[int, int]:
         """Recolor these bands; returns (pixels in regions, pixels out of gamut)."""
@@ -250,6 +257,8 @@ class _Job:
             result = target.reshape(n, 3) if in_target else product[:n]
             with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is told in words below
                 inside += self._apply(rows, linear, weights, result)
+                if self.convert is not None:
+                    result[...] = _product(result, self.convert, linear)
             if self.floats and not np.isfinite(np.vdot(result, result)):
                 _check_finite(result)
             if self.integer:
@@ -272,6 +281,9 @@ class _Job:
         """Recolor one band into `result`; returns the number of pixels inside regions."""
         if len(weights) == 1 and (weights[0] is None or weights[0].min() == 1):
             _product(linear, self.matrices[0], result)
+            correction = self._correction(0, rows)
+            if correction is not None:
+                result += correction
             return len(linear)
         np.copyto(result, linear)
         room = np.ones(len(linear), np.float32)
@@ -289,8 +301,21 @@ class _Job:
                 at = (edge.rows[part] - rows.start) * width + edge.columns[part] - self.columns.start
                 scale = granted[at] / np.maximum(asked[at], 1e-6)
                 change[at] = (edge.share[part] @ self.changes[k]) * scale[:, None]
+            correction = self._correction(k, rows)
+            if correction is not None:
+                change += correction * granted[:, None]
             result += change
         return int(np.count_nonzero(room < 1))
+
+    def _correction(self, k: int, rows: slice) -> NDArray[np.float32] | None:
+        """(n, 3) what the corrections of region `k` add to a band; None where they are all 0."""
+        extra = self.regions[k].extra
+        if extra is None:
+            return None
+        part = extra[rows, self.columns]
+        if not part.any():
+            return None
+        return part.reshape(-1, part.shape[2]).astype(np.float32, copy=False) @ self.corrections[k]
 
     def _weights(self, region: RegionMatrix, rows: slice) -> NDArray[np.float32] | None:
         if region.mask is None:

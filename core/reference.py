@@ -22,6 +22,14 @@ DARK = 0.004
 # Pixels that a search looks at; more do not change the answer.
 _SAMPLE = 60_000
 
+# Sine of the angle by which a pixel of the same material may leave the plane of its color and the white.
+_OFF_PLANE = 0.035
+
+
+# Gloss in a clicked pixel, against its brightest channel and times the sine of its angle to the white: below the
+# first it is within what matte pixels scatter and is left alone, from the second on all of it is taken out.
+_GLOSS_RAMP = (0.011, 0.016)
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -30,11 +38,12 @@ class Reference:
     Attributes
     ----------
     color
-        (3,) float64 linear RGB.
+        (3,) float64 linear RGB, matte.
     pixel
         (x, y), or None if no pixel was given.
     gloss
-        Surface reflection in it, as a share of the white; 0 if none was seen. Only measured for a pixel.
+        Surface reflection that was found in the pixel and is not in `color`, as a share of the white; 0 if no pixel
+        was given.
     """
 
     color: NDArray[np.float64]
@@ -88,7 +97,7 @@ def trimmed_mean(pixels: NDArray, keep: float = 0.6) -> NDArray[np.float64]:
 
 
 def reference_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray | None = None) -> Reference:
-    """Read the reference color at a clicked pixel.
+    """Read the color at a clicked pixel as it is, gloss and all.
 
     Parameters
     ----------
@@ -123,35 +132,69 @@ def reference_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArr
         )
     if color.max() <= 0 or (color / white).max() < DARK / 4:
         raise ReferenceColorError(f"Reference pixel ({x}, {y}) is black: pick a lit, matte part of the product.")
-    return Reference(color, (x, y), _gloss_in(color, picture, (x, y), white, mask))
+    return Reference(color, (x, y))
 
 
-def _gloss_in(color: NDArray, picture: Picture, pixel: tuple[int, int], white: NDArray, mask: NDArray | None) -> float:
-    """How much surface reflection a color holds, as a share of the white, against the matte pixels around it."""
-    if sine(color, white) < 0.1:
+def matte_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray | None = None) -> Reference:
+    """Read the product's body color at a clicked pixel, in the light that falls there.
+
+    What surface reflection the pixel holds, against the matte pixels of its material, is taken out: the click says
+    which product and how much light, its region says what is matte. Parameters and errors as for
+    :func:`reference_at`, which reads a pixel as it is.
+    """
+    read = reference_at(picture, pixel, white, mask)
+    gloss = gloss_in(read, picture, white, mask)
+    low, high = np.array(_GLOSS_RAMP) * (read.color / white).max() / max(sine(read.color, white), 1e-3)
+    gloss *= float(np.clip((gloss - low) / (high - low), 0, 1))
+    return Reference(read.color - gloss * white, read.pixel, gloss)
+
+
+def gloss_in(read: Reference, picture: Picture, white: NDArray, mask: NDArray | None = None) -> float:
+    """Surface reflection in a color that was read at a pixel, as a share of the white; >= 0.
+
+    It is compared with the pixels of the mask, or with those around the pixel.
+    """
+    if read.pixel is None:
+        return 0.0
+    if mask is None:
+        x, y = read.pixel
+        reach = max(8, round(0.12 * max(picture.shape)))
+        step = max(1, reach // 60)
+        rows, columns = slice(max(0, y - reach), y + reach, step), slice(max(0, x - reach), x + reach, step)
+        pixels = picture.linear(rows, columns).reshape(-1, 3)
+    else:
+        pixels = picture.sample(_SAMPLE, mask)
+    return max(0.0, _gloss_against(read.color / white, pixels[pixels.max(axis=1) < picture.clip_level] / white))
+
+
+def _gloss_against(color: NDArray, pixels: NDArray) -> float:
+    """Gloss in a white-balanced color (3,), against the most matte of the pixels (n, 3) of its material.
+
+    The pixels of one material lie in the plane of its color and the white (Shafer 1985); in units of the color, those
+    without gloss have the same B / A. Below zero if the color is more matte than they are.
+    """
+    if sine(color) < 0.1:
         return 0.0  # almost grey: gloss and body look alike
-    x, y = pixel
-    reach = max(8, round(0.12 * max(picture.shape)))
-    step = max(1, reach // 60)
-    rows, columns = slice(max(0, y - reach), y + reach, step), slice(max(0, x - reach), x + reach, step)
-    around = picture.linear(rows, columns).reshape(-1, 3) / white
-    keep = (around.max(axis=1) > DARK) & ((around * white).max(axis=1) < picture.clip_level)
-    if mask is not None:
-        keep &= as_weights(mask[rows, columns]).reshape(-1) > 0.95
-    # Of the same material: in the plane of this color and the white, on the colored side of it.
-    normal, toward_white = _plane(color / white)
-    body = color / white / np.linalg.norm(color / white)
-    along = np.maximum(around @ body, 1e-9)
-    paler = (around @ toward_white) / along
-    same = keep & (np.abs(around @ normal) / along < 0.035) & (paler < 0.02) & (along > 0.3 * (color / white) @ body)
+    split = np.linalg.pinv(np.column_stack([color, np.ones(3)]))
+    a, b = split @ pixels.T
+    normal, _ = _plane(color)
+    off = pixels @ normal
+    same = (a > 0) & (np.abs(off) < _OFF_PLANE * np.linalg.norm(pixels, axis=1))
     if np.count_nonzero(same) < 20:
         return 0.0
-    # The matte edge of the wedge: the most colored tenth, without its own outliers.
-    edge = np.quantile(paler[same], 0.1)
-    matte = np.quantile(around[same & (paler <= edge + 0.005)], 0.5, axis=0)
-    if sine(matte) < 0.05:
-        return 0.0
-    return float(max(0.0, np.linalg.lstsq(np.column_stack([matte, np.ones(3)]), color / white, rcond=None)[0][1]))
+    # Only the best lit: reflections of all that is around, light that met the cloth twice, and noise weigh less there.
+    lit = same & (a > 0.8 * np.quantile(a[same], 0.9))
+    low, middle, high = np.quantile(b[lit] / a[lit], (0.1, 0.5, 0.9))
+    # Gloss reaches upward. What reaches as far down is noise, and farther down the light of folds: no edge to go to.
+    both = (middle - low) / max(high - middle, 1e-9)
+    # Noise widens the spread: by as much as it does off the plane, if its variance goes with the light of a channel.
+    shot = np.maximum(color, 0)
+    noise = np.median(np.abs(off[lit] / a[lit])) / 0.6745 * np.sqrt((split[1] ** 2 @ shot) / (normal**2 @ shot))
+    edge = middle - np.sqrt(max(0.0, (middle - low) ** 2 - (1.28 * noise) ** 2))
+    matte = color + edge + (middle - edge) * np.clip((both - 0.9) / 0.15, 0, 1)
+    # A matte color that is almost grey, or none, says nothing of the material.
+    known = matte.max() > 0 and sine(np.maximum(matte, 0)) > 0.05
+    return float(color[0] - matte[0]) if known else 0.0
 
 
 def _plane(color: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -170,9 +213,8 @@ def _plane(color: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = None) -> Reference:
     """Find the product's body color inside the mask: matte, unclipped, not dark, trimmed.
 
-    Gloss makes a color paler and brighter, folds and shadow make it darker and more colored. So: of the pixels of
-    the mask's main color, the well lit ones; of these, those at the colored edge of their wedge toward white,
-    without the outermost; of these, the median.
+    Gloss makes a color paler and brighter, folds and shadow make it darker and more colored. So: of the well lit
+    pixels of the mask's main color the median, moved within its plane to the most matte of the best lit ones.
 
     Parameters
     ----------
@@ -206,12 +248,9 @@ def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = Non
     balanced, light = balanced[lit], light[lit]
     same = _main_material(balanced)
     balanced, light = balanced[same], light[same]
-    well_lit = light >= np.quantile(light, 0.35)
-    balanced = balanced[well_lit]
-    colored = 1 - balanced.min(axis=1) / balanced.mean(axis=1)
-    low, high = np.quantile(colored, (0.55, 0.95))
-    edge = balanced[(colored >= low) & (colored <= high)]
-    return Reference(np.quantile(edge, 0.5, axis=0) * white)
+    low, high = np.quantile(light, (0.5, 0.9))
+    lit = np.quantile(balanced[(light >= low) & (light <= high)], 0.5, axis=0)
+    return Reference((lit - _gloss_against(lit, balanced)) * white)
 
 
 def _main_material(balanced: NDArray) -> NDArray[np.bool_]:
@@ -230,6 +269,15 @@ def _main_material(balanced: NDArray) -> NDArray[np.bool_]:
     peak = (np.argmax(smooth) + 0.5) * 2 * np.pi / 72 - np.pi
     apart = np.abs((hue - peak + np.pi) % (2 * np.pi) - np.pi)
     return colored & (apart < np.radians(12))
+
+
+def _most_colored(pixels: NDArray) -> NDArray[np.float64]:
+    """(3,) body color of (n, 3) pixels of one product when the white is not known: well lit and of much color."""
+    light = pixels.mean(axis=1)
+    well_lit = pixels[_main_material(pixels) & (light >= np.quantile(light, 0.35))]
+    colored = 1 - well_lit.min(axis=1) / well_lit.mean(axis=1)
+    low, high = np.quantile(colored, (0.55, 0.95))
+    return np.quantile(well_lit[(colored >= low) & (colored <= high)], 0.5, axis=0)
 
 
 def white_at(picture: Picture, pixel: ArrayLike, gray: float = 1.0) -> NDArray[np.float64]:
@@ -302,7 +350,7 @@ def white_from_highlights(
         raise WhiteError(
             "The product has too few unclipped, lit pixels to find the white: pick a white card or name the light."
         )
-    body = matte_reference(picture, np.ones(3), mask).color
+    body = _most_colored(pixels)
     body = body / np.linalg.norm(body)
     along = pixels @ body
     across = pixels - along[:, None] * body

@@ -9,6 +9,7 @@ another color.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +69,9 @@ _GLOSS_SLOPE = 0.18
 _SHEEN_SLOPE = 0.5
 _SMOOTH = 0.2
 
+# Half the width, in pixels of the reduced picture, of the seam between two materials that are both selected.
+_SEAM = 2
+
 # How far folds may leave it.
 _FOLD_SLOPE = 0.21
 
@@ -75,7 +79,19 @@ _FOLD_SLOPE = 0.21
 def region_at(
     picture: Picture, click: ArrayLike, white: NDArray | None = None, tolerance: float = 1.0
 ) -> NDArray[np.uint8]:
-    """Select the material under a click.
+    """Select the material under a click; see :func:`region_from_clicks`."""
+    return region_from_clicks(picture, click, white=white, tolerance=tolerance)
+
+
+def region_from_clicks(
+    picture: Picture,
+    click: ArrayLike,
+    added: Sequence[ArrayLike] = (),
+    removed: Sequence[ArrayLike] = (),
+    white: NDArray | None = None,
+    tolerance: float = 1.0,
+) -> NDArray[np.uint8]:
+    """Select the material under a click, with what more clicks add and without what others take away.
 
     Parameters
     ----------
@@ -83,6 +99,8 @@ def region_at(
         The photo.
     click
         (x, y) from the top left, on a matte, lit part of the product.
+    added, removed
+        Further such clicks. What a click in `removed` would select goes, whichever click brought it.
     white
         (3,) white of the light; None for ones.
     tolerance
@@ -90,33 +108,57 @@ def region_at(
 
     Returns
     -------
-    (height, width) uint8 coverage, 255 inside, with a soft edge of one to three pixels.
+    (height, width) uint8 coverage, 255 inside, with a soft edge of one to three pixels around the whole; where
+    materials of the selection meet there is no edge.
 
     Raises
     ------
     ReferenceColorError
-        If the click lies outside the picture.
+        If a click lies outside the picture.
     MaskError
-        If the click is on black, or the tolerance is not above zero.
+        If a click is on black, nothing is left, or the tolerance is not above zero.
     """
     if not tolerance > 0:
         raise MaskError(f"Tolerance {tolerance} is not above zero: 1 is ordinary, 0.5 strict, 2 generous.")
-    x, y = check_pixel(picture, click, "Click")
     w = np.ones(3) if white is None else np.asarray(white, np.float64)
+    pixels = [check_pixel(picture, at, "Click") for at in (click, *added, *removed)]
     height, width = picture.shape
     step = max(1, int(np.ceil(np.sqrt(height * width / _WORKING_PIXELS))))
     small = shrink(picture, step)
-    body = trimmed_mean(read_window(picture, (x, y))) / w
+    parts = [_grown_from(picture, small, step, pixel, w, tolerance) for pixel in pixels]
+    kept = 1 + len(added)
+    inside = parts[0][0]
+    for grown, _ in parts[1:kept]:
+        # Where two materials meet, mixed pixels look like neither.
+        inside = inside | grown | (dilate(inside, _SEAM) & dilate(grown, _SEAM))
+    for grown, _ in parts[kept:]:
+        inside = inside & ~grown
+    if not inside.any():
+        raise MaskError("The clicks that take away leave nothing of the region: drop one, or lower the tolerance.")
+    cover = _soft_edge(picture, small, inside, step)
+    textured = [grown for grown, blurred in parts if blurred]
+    if textured:
+        # Around a texture there are no two pure colors to unmix an edge between.
+        near = _hard_edge(picture.shape, dilate(np.logical_or.reduce(textured), _SEAM + 1), step)
+        np.copyto(cover, _hard_edge(picture.shape, inside, step), where=near > 0)
+    return cover
+
+
+def _grown_from(
+    picture: Picture, small: NDArray, step: int, pixel: tuple[int, int], white: NDArray, tolerance: float
+) -> tuple[NDArray[np.bool_], bool]:
+    """Return what one click selects of the reduced picture, and whether that had to be blurred for its texture."""
+    x, y = pixel
+    body = trimmed_mean(read_window(picture, pixel)) / white
     if body.max() < DARK / 4:
         raise MaskError(f"Click ({x}, {y}) is on black: click a lit part of the product.")
     start = min(y // step, small.shape[0] - 1), min(x // step, small.shape[1] - 1)
-    balanced, body, blurred = _calm(small / w.astype(np.float32), body, start)
-    grower = _Grower(balanced, w, start, picture.clip_level)
+    balanced, body, blurred = _calm(small / white.astype(np.float32), body, start)
+    grower = _Grower(balanced, white, start, picture.clip_level)
     own = _STRICT
     for _ in range(2):
         body, own = grower.learn(grower.grow(body, _times(own, tolerance)), body)
-    grown = grower.grow(body, _times(own, tolerance))
-    return _hard_edge(picture.shape, grown, step) if blurred else _soft_edge(picture, small, grown, step)
+    return grower.grow(body, _times(own, tolerance)), blurred
 
 
 def _calm(balanced: NDArray, body: NDArray, start: tuple[int, int]) -> tuple[NDArray, NDArray, bool]:

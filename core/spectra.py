@@ -160,12 +160,13 @@ def camera_names() -> list[str]:
 
 
 def chart(name: str = "ISO 17321-1") -> dict[str, Spectrum]:
-    """Reflectances of the 24 patches of a ColorChecker, by the name of the patch.
+    """Reflectances of the patches of a chart, by the name of the patch.
 
     Parameters
     ----------
     name
-        "ISO 17321-1", "ColorChecker N Ohta" or "BabelColor Average".
+        Of the ColorChecker "ISO 17321-1", "ColorChecker N Ohta" or "BabelColor Average"; of test colors "CIE 13.3" or
+        "NIST CQS".
     """
     table = _tables()[f"chart/{name}"]
     patches = _tables()[f"patches/{name}"]
@@ -205,29 +206,39 @@ def _plain(name: str) -> str:
 
 
 def illuminant(name: str | float | Spectrum) -> Spectrum:
-    """Light by its name or correlated color temperature.
+    """Light by its name, its temperature, a file, or as a mixture of these.
 
     Parameters
     ----------
     name
         A CIE name in any spelling ("D65", "d 65", "FL11", "F11", "LED-B3"), a daylight that is not tabulated
-        ("D93"), or a temperature ("5600K", "2856 K", a number). From 4000 K up a temperature means CIE
-        daylight, below it a black body. A `Spectrum` is returned as it is.
+        ("D93"); a temperature ("5600K", "2856 K", a number), which from 4000 K up means CIE daylight and below it a
+        black body; "blackbody 6500K" and "daylight 5000K" say which; a CSV file of wavelength and power; or several
+        of these with their shares of the luminance ("0.7 D65 + 0.3 A", "60% 3200K + 40% FL11"; without shares they
+        are equal). A `Spectrum` is returned as it is.
 
     Returns
     -------
-    Relative power, 100 at 560 nm where computed.
+    Relative power, 100 at 560 nm where computed, Y = 100 for a mixture.
 
     Raises
     ------
     WhiteError
-        If there is no such light, or the temperature is outside 1000..25000 K.
+        If there is no such light, or the temperature is out of range.
+    FileError
+        If a file cannot be understood.
     """
     if isinstance(name, Spectrum):
         return name
-    plain = _plain(str(name))
-    if match := re.fullmatch(r"(\d+(?:\.\d*)?)K?", plain):
-        return _light_of_temperature(float(match[1]))
+    text = str(name).strip()
+    is_file = text.lower().endswith(".csv")
+    if "+" in text and not (is_file and Path(text).is_file()):
+        return _mixture(text)
+    if is_file:
+        return _measured_light(text)
+    plain = _plain(text)
+    if match := re.fullmatch(r"(BLACKBODY|DAYLIGHT)?(\d+(?:\.\d*)?)K?", plain):
+        return _light_of_temperature(float(match[2]), match[1])
     plain = re.sub(r"^F(?=\d)", "FL", plain)
     known = {_plain(key): key for key in illuminant_names()}
     if plain in known:
@@ -247,10 +258,44 @@ def illuminant(name: str | float | Spectrum) -> Spectrum:
     )
 
 
-def _light_of_temperature(kelvin: float) -> Spectrum:
-    if not 1000 <= kelvin <= 25000:
-        raise WhiteError(f"Color temperature {kelvin:g}K is out of range: use 1000 to 25000 K.")
-    return Spectrum(*(_daylight(kelvin) if kelvin >= 4000 else _black_body(kelvin)), f"{kelvin:g} K")
+def _mixture(text: str) -> Spectrum:
+    wavelengths, y_bar = observer().wavelengths, observer().values[:, 1]
+    shares, lights = [], []
+    for term in text.split("+"):
+        match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)(?:\s*(%)\s*|\s*[*×]\s*|\s+)(\S.*?)\s*", term)
+        if match is None or match[3] in ("K", "k"):  # "2856 K" is a temperature
+            share, name = None, term.strip()
+        else:
+            share, name = float(match[1]) / (100 if match[2] else 1), match[3]
+        shares.append(share)
+        lights.append(illuminant(name))
+    given = [1.0 if share is None else share for share in shares]
+    if sum(given) <= 0 or (None in shares and any(share is not None for share in shares)):
+        raise WhiteError(f"Illuminant '{text}' lacks a share: write all of them, as in 0.7 D65 + 0.3 A.")
+    total = np.zeros(len(wavelengths))
+    for share, light in zip(given, lights, strict=True):
+        power = light.at(wavelengths, linear=True)
+        total += 100 * share / sum(given) * power / (power @ y_bar)
+    return Spectrum(wavelengths, total, " + ".join(f"{s:g} {e.name}" for s, e in zip(given, lights, strict=True)))
+
+
+def _measured_light(path: str) -> Spectrum:
+    light = read_csv(path)
+    if light.values.min() < 0 or light.values.max() <= 0:
+        raise FileError(f"Light '{path}' has power below 0, or none at all: measure it again, or clip the noise to 0.")
+    return light
+
+
+def _light_of_temperature(kelvin: float, kind: str | None) -> Spectrum:
+    """Black body or daylight; without a kind the one that is meant in this range."""
+    low, high = {"BLACKBODY": (500, 100_000), "DAYLIGHT": (4000, 25_000), None: (1000, 25_000)}[kind]
+    if not low <= kelvin <= high:
+        what = f"{kind.capitalize()} " if kind else ""
+        raise WhiteError(f"Color temperature {what}{kelvin:g}K is out of range: use {low} to {high} K.")
+    kind = kind or ("DAYLIGHT" if kelvin >= 4000 else "BLACKBODY")
+    plain = 1000 <= kelvin <= 25_000 and (kind == "DAYLIGHT") == (kelvin >= 4000)
+    name = f"{kelvin:g} K" if plain else f"{kind.lower()} {kelvin:g} K"
+    return Spectrum(*(_daylight if kind == "DAYLIGHT" else _black_body)(kelvin), name)
 
 
 def _daylight(kelvin: float) -> tuple[NDArray, NDArray]:
@@ -305,6 +350,11 @@ def camera_sensitivities(camera: str | Path | Spectrum) -> Spectrum:
     return _table(f"camera/{found[0]}", found[0])
 
 
+def covers(wavelengths: NDArray) -> bool:
+    """Tell whether increasing wavelengths (n,) cover 400 to 700 nm in six steps or more: else a color is a guess."""
+    return len(wavelengths) >= 7 and bool(wavelengths[0] <= 400 and wavelengths[-1] >= 700)
+
+
 def read_csv(path: str | Path, columns: int = 1) -> Spectrum:
     """Read a spectrum from a CSV file of wavelength and value(s), one wavelength a line.
 
@@ -353,7 +403,7 @@ def read_csv(path: str | Path, columns: int = 1) -> Spectrum:
             raise FileError(f"{path}, line {number}: wavelength {row[0]:g} does not increase: sort the lines.")
         rows.append(row)
     table = np.array(rows).reshape(-1, columns + 1)
-    if len(table) < 7 or table[0, 0] > 400 or table[-1, 0] < 700:
+    if not covers(table[:, 0]):
         raise FileError(f"Spectrum '{path}' does not cover 400 to 700 nm in six steps or more: measure all of it.")
     return Spectrum(table[:, 0], table[:, 1] if columns == 1 else table[:, 1:], path.stem)
 
@@ -416,4 +466,8 @@ def _response(
         raise WhiteError("The light gives the observer or camera nothing to see: use another illuminant.")
     if reflectance is None:
         return white / white[unit]
+    if reflectance.values.size > len(reflectance.wavelengths) ** 2:
+        # Interpolation is linear in the samples: for many reflectances it is done once, on the weights of the samples.
+        samples = Spectrum(reflectance.wavelengths, np.eye(len(reflectance.wavelengths)))
+        return reflectance.values.T @ (samples.at(wavelengths).T @ lit) / white[unit]
     return reflectance.at(wavelengths).T @ lit / white[unit]

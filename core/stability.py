@@ -90,6 +90,7 @@ def predicted_error(
     noise: Noise,
     white: NDArray,
     mask: NDArray | None = None,
+    extra: NDArray | None = None,
 ) -> NDArray[np.float32]:
     """First-order estimate of the color error of a recolor; see `Analysis.predicted_error`.
 
@@ -98,13 +99,15 @@ def predicted_error(
     picture
         The photo.
     dropped, kept
-        (3, 3) recolor matrices that drop the residual, and that carry over as much of it as may be wrong.
+        (3, 3 + n) recolor matrices that drop the residual, and that carry over as much of it as may be wrong.
     noise
         Noise of the photo.
     white
         (3,) white of the result, for the color difference.
     mask
         (height, width) checked coverage, or None.
+    extra
+        (height, width, n) corrections that the matrices take, or None.
 
     Returns
     -------
@@ -126,10 +129,12 @@ def predicted_error(
         pixels = picture.linear(rows).reshape(-1, 3)[inside]
         if len(pixels) == 0:
             continue
+        if extra is not None:
+            pixels = np.concatenate([pixels, extra[rows].reshape(-1, extra.shape[2])[inside]], axis=1)
         plain = pixels @ dropped.T
         result = lab(plain)
         model = delta_e_2000(lab(pixels @ kept.T), result)
-        sigma = gain * noise.at(pixels.mean(axis=1))
+        sigma = gain * noise.at(pixels[:, :3].mean(axis=1))
         noisy = delta_e_2000(lab(plain + sigma[:, None]), result)
         out[rows].reshape(-1)[inside] = np.hypot(model, noisy)
     return out

@@ -219,9 +219,10 @@ def matte(nodes: Nodes) -> Socket:
     return nodes.add("ShaderNodeBsdfDiffuse", {"Color": nodes.scene_property("dye"), "Roughness": 0.0}).outputs[0]
 
 
-def gray(reflectance: float, roughness: float = 0.7) -> Callable[[Nodes], Socket]:
-    """Return a neutral, nearly matte surface: the table."""
-    return lambda nodes: principled(nodes, (reflectance,) * 3 + (1.0,), roughness, Specular_IOR_Level=0.2)
+def nearly_matte(reflectance: float | Point, roughness: float = 0.7) -> Callable[[Nodes], Socket]:
+    """Return a nearly matte surface, neutral or of a color: the table."""
+    color = reflectance if isinstance(reflectance, tuple) else (reflectance,) * 3
+    return lambda nodes: principled(nodes, (*color, 1.0), roughness, Specular_IOR_Level=0.2)
 
 
 def rough(color: str) -> Callable[[Nodes], Socket]:
@@ -503,7 +504,7 @@ def mug(
     dye: Point = (0.429, 0.037, 0.045),
     roughness: float = 0.22,
     translucency: float = 0.0,
-    table: float = 0.45,
+    table: float | Point = 0.45,
     key: float = KEY_WHITE,
 ) -> bpy.types.Scene:
     """Glossy plastic mug on a neutral table, nearly parallel light: the paper's cups.
@@ -517,7 +518,7 @@ def mug(
     translucency
         Part of the light that a face of the wall passes on instead of reflecting it (0..1).
     table
-        Reflectance of the table.
+        Reflectance of the table, or its color.
     key
         Radiance of a white diffuser that faces the key light.
     """
@@ -533,7 +534,7 @@ def mug(
         return nodes.add("ShaderNodeMixShader", {0: translucency, 1: surface, 2: through}).outputs[0]
 
     add_mug(new_material(PRODUCT, body, dyed=True))
-    add_table(new_material("Table", gray(table)))
+    add_table(new_material("Table", nearly_matte(table)))
     add_sun(scene, (-2.6, -4.5, 2.8), white=key)
     add_environment(scene, 0.12)
     add_camera(scene, (0.1, -6.5, 2.2), (0.1, 0.0, 0.46), lens=160)
@@ -568,7 +569,7 @@ def two_lights() -> bpy.types.Scene:
 def color_bleeding() -> bpy.types.Scene:
     """The mug on a white table before a white wall, which both take on its color."""
     scene = mug("color_bleeding", table=0.85, key=0.75)
-    wall = new_material("Wall", gray(0.85))
+    wall = new_material("Wall", nearly_matte(0.85))
     # The wall, beside the mug, gets little light of its own: most of what it shows has met the mug.
     points = np.array([[[-0.62, -1.0, z], [-0.62, 2.0, z]] for z in (0.0, 1.4)])
     add_grid("Wall", points, wall)
@@ -620,10 +621,10 @@ def fabric_cylinder(name: str = "fabric_cylinder", *, undyed: Point | None = Non
     material = new_material(PRODUCT, lambda n: fabric(n, (96, 50), undyed=thread), dyed=True)
     side = [(0.45, z) for z in np.linspace(0.0, 1.5, 12)]
     add_lathe("Fabric", side, material, subdivide=0, segments=192)
-    board = new_material("Board", gray(0.8))
+    board = new_material("Board", nearly_matte(0.8))
     cap = add_lathe("Cap", [(0.455, 1.5), (0.455, 1.53), (0.45, 1.535), (0.0, 1.535)], board, subdivide=0)
     cap.data.shade_flat()
-    add_table(new_material("Table", gray(0.45)))
+    add_table(new_material("Table", nearly_matte(0.45)))
     add_sun(scene, (-3.0, -4.0, 3.5))
     add_environment(scene, 0.12)
     add_camera(scene, (0.0, -6.5, 2.3), (0.05, 0.0, 0.76), lens=128)
@@ -667,7 +668,7 @@ def folds(name: str = "folds", *, depth: float = 0.16, key: float = KEY_WHITE) -
     """
     scene = new_scene(name, dye=(0.429, 0.037, 0.045))
     add_curtain(new_material(PRODUCT, matte, dyed=True), depth)
-    add_table(new_material("Table", gray(0.45)))
+    add_table(new_material("Table", nearly_matte(0.45)))
     add_sun(scene, (-1.3, -4.5, 2.2), white=key, angle=6.0)
     add_environment(scene, 0.15)
     add_camera(scene, (0.0, -7.5, 1.3), (0.0, 0.0, 0.95), lens=118)
@@ -710,7 +711,7 @@ def satin(*, tint: float = 0.6, sheen: float = 0.45) -> bpy.types.Scene:
 
     scene = new_scene("satin", dye=(0.30, 0.03, 0.10))
     add_curtain(new_material(PRODUCT, silk, dyed=True), 0.09)
-    add_table(new_material("Table", gray(0.45)))
+    add_table(new_material("Table", nearly_matte(0.45)))
     add_sun(scene, (-1.3, -4.5, 2.6), angle=6.0)
     add_environment(scene, 0.15)
     add_camera(scene, (0.0, -7.5, 1.3), (0.0, 0.0, 0.95), lens=118)
@@ -734,7 +735,7 @@ def metal(*, colored: bool = True) -> bpy.types.Scene:
         board = new_material(side.title(), rough(side))
         points = np.array([[[x, -2.2, z], [x, 1.5, z]] for z in (0.0, 2.2)])
         add_grid(f"Board {side}", points, board)
-    add_table(new_material("Table", gray(0.45)))
+    add_table(new_material("Table", nearly_matte(0.45)))
     add_sun(scene, (-0.9, -4.5, 3.2), white=0.8, angle=8.0)
     add_environment(scene, 0.35)
     add_camera(scene, (0.1, -6.5, 2.2), (0.1, 0.0, 0.46), lens=160)
@@ -803,12 +804,12 @@ def sneaker() -> bpy.types.Scene:
     add_grid("Upper", surface, upper, closed_u=True, subdivide=1)
 
     # Laces across the instep.
-    white = new_material("Laces", gray(0.75))
+    white = new_material("Laces", nearly_matte(0.75))
     for ring in (9, 11, 13, 15):
         path = surface[np.arange(-8, 9), ring] + (0.0, 0.0, 0.008)
         add_tube("Lace", path, np.full((17, 2), (0.022, 0.014)), (1, 0, 0), white, segments=10)
 
-    add_table(new_material("Table", gray(0.45)))
+    add_table(new_material("Table", nearly_matte(0.45)))
     add_sun(scene, (-2.0, -4.5, 4.0), angle=6.0)
     add_environment(scene, 0.15)
     add_camera(scene, (2.6, -5.6, 3.0), (0.0, 0.0, 0.34), lens=100)
@@ -850,12 +851,17 @@ def save(path: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write the .blend files."""
+    from .. import addon
+    from . import photos  # renders the scenes, which are built here
+
     parser = argparse.ArgumentParser(description="Make the sample scenes.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="scenes to make (default: all)")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder to write to")
     options = parser.parse_args(arguments)
+    addon.register()
     for name in options.names or SCENES:
-        build(name)
+        picture, view = photos.take(name)
+        photos.add(build(name), picture, view)
         path = options.out / f"{name}.blend"
         save(path)
         print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")

@@ -2,6 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -9,6 +17,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+# Before any test imports bpy: Blender shall neither read nor write what is the user's.
+_profile = tempfile.mkdtemp(prefix="dyehouse-blender-")
+atexit.register(shutil.rmtree, _profile, ignore_errors=True)
+os.environ["BLENDER_USER_RESOURCES"] = _profile
 
 
 @dataclass
@@ -69,3 +84,35 @@ def astronaut_file() -> Path:
 @pytest.fixture(scope="session")
 def coffee_file() -> Path:
     return photo_of_skimage("coffee.png")
+
+
+@pytest.fixture(scope="session")
+def build_extension() -> Callable[[Path, Path], Path]:
+    """`tools/build_extension.py`: from a folder with the extension's source to the zip in another folder."""
+
+    def build(source: Path, out: Path) -> Path:
+        tool = [sys.executable, str(ROOT / "tools" / "build_extension.py"), "--source", str(source), "--out", str(out)]
+        done = subprocess.run(tool, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return Path(done.stdout.strip())
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def package(build_extension: Callable[[Path, Path], Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built extension."""
+    return build_extension(ROOT, tmp_path_factory.mktemp("package"))
+
+
+@pytest.fixture(scope="session")
+def previous_package(build_extension: Callable[[Path, Path], Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The extension built from the same files under a lower version number."""
+    source = tmp_path_factory.mktemp("previous")
+    manifest = (ROOT / "blender_manifest.toml").read_text()
+    for path in tomllib.loads(manifest)["build"]["paths"]:
+        (source / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / path, source / path)
+    older = re.sub(r'^version = ".*"$', 'version = "0.0.1"', manifest, flags=re.MULTILINE)
+    (source / "blender_manifest.toml").write_text(older)
+    return build_extension(source, source)

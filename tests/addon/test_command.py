@@ -1,8 +1,5 @@
 """`blender --command dyehouse`, inside Blender's Python."""
 
-import subprocess
-import sys
-import zipfile
 from pathlib import Path
 from types import ModuleType
 
@@ -36,20 +33,3 @@ def test_the_command_recolors(extension: ModuleType, tmp_path: Path, capsys: pyt
     assert (files.read(output).pixels == (0x1F, 0x4E, 0x79)).all()
     assert command._run(asked) == 2
     assert "exists already" in capsys.readouterr().err
-
-
-def test_it_builds_and_validates_as_an_extension(tmp_path: Path) -> None:
-    root = Path(__file__).resolve().parents[2]
-    tool = Path(bpy.utils.system_resource("SCRIPTS")) / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
-    package = tmp_path / "dyehouse.zip"
-    for arguments in (
-        ["build", "--source-dir", str(root), "--output-filepath", str(package)],
-        ["validate", str(package)],
-    ):
-        done = subprocess.run([sys.executable, str(tool), *arguments], capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stdout + done.stderr
-    with zipfile.ZipFile(package) as archive:
-        names = archive.namelist()
-    assert package.stat().st_size < 1_000_000
-    assert "core/dichromatic.py" in names
-    assert not any(part in name for name in names for part in ("tests", "sample_blends", "benchmarks", "docs"))

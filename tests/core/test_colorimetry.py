@@ -210,3 +210,9 @@ def test_white_outside_the_space(light, name):
 
 def test_wider_space_is_a_remedy():
     assert colorimetry.illuminant_white("1700K", SPACES["rec2020"]).min() > 0
+
+
+def test_oklab():
+    xyz = np.random.default_rng(1).uniform(-0.1, 1, (50, 3))
+    np.testing.assert_allclose(colorimetry.xyz_to_oklab(xyz), colour.XYZ_to_Oklab(xyz), atol=1e-6)
+    np.testing.assert_allclose(colorimetry.oklab_to_xyz(colorimetry.xyz_to_oklab(xyz)), xyz, atol=1e-9)

@@ -1,11 +1,13 @@
 """What happens to colors that the output cannot hold."""
 
+import colour
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dyehouse.core import gamut
+from dyehouse.core import colorimetry, gamut
+from dyehouse.core.colorspace import SPACES, SRGB
 
 WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 values = st.one_of(st.floats(-3, 5, width=32), st.floats(0, 1, width=32), st.sampled_from([-1e-3, 1.001, -1e6, 1e6]))
@@ -101,3 +103,71 @@ def test_out_of_gamut_takes_any_shape():
     picture[1, 2, 0] = 1.1
     picture[3, 4, 2] = -0.1
     assert [tuple(map(int, p)) for p in np.argwhere(gamut.out_of_gamut(picture))] == [(1, 2), (3, 4)]
+
+
+def hues(linear, space, method):
+    if method == "lab":
+        return colorimetry.lab_to_lch(colorimetry.linear_to_lab(linear, space))
+    xyz = linear @ (colorimetry.adaptation_matrix(space.white, SRGB.white) @ space.to_xyz).T
+    return colorimetry.lab_to_lch(colour.XYZ_to_Oklab(xyz))
+
+
+@pytest.mark.parametrize(
+    "space", [SPACES[name] for name in ("srgb", "display-p3", "rec2020", "acescg")], ids=lambda s: s.name
+)
+@pytest.mark.parametrize("method", ["lab", "oklch"])
+def test_nearest_keeps_the_hue_and_is_reproducible(space, method):
+    rng = np.random.default_rng(2)
+    colors = rng.uniform(-0.3, 1.3, (60, 3))
+    found = gamut.nearest(colors, space, method)
+    assert found.linear.min() >= -gamut.TOLERANCE
+    assert found.linear.max() <= 1 + gamut.TOLERANCE
+    before, after = hues(colors, space, method), hues(found.linear, space, method)
+    moved = gamut.out_of_gamut(colors)
+    np.testing.assert_array_equal(found.linear[~moved], colors[~moved])
+    chromatic = moved & (after[:, 1] > 0.02 * before[:, 1]) & (before[:, 1] > (5 if method == "lab" else 0.02))
+    assert chromatic.sum() > 20
+    turned = (after - before)[chromatic, 2]
+    assert np.abs((turned + 180) % 360 - 180).max() < 0.1
+    expected = colour.delta_E(*(colorimetry.linear_to_lab(c, space) for c in (colors, found.linear)), method="CIE 2000")
+    np.testing.assert_allclose(found.difference, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["lab", "oklch"])
+def test_no_reproducible_color_of_that_hue_is_nearer(method):
+    # Against a search of the slice of that hue point by point.
+    targets = [[60, -80, 20], [50, 0, -110], [99, 20, 90], [2, 30, -40], [40, 90, 60]]
+    for target in colorimetry.lab_to_linear(np.array(targets), SRGB):
+        found = gamut.nearest(target, SRGB, method)
+        _, C, h = hues(target[None], SRGB, method)[0]
+        grid = np.stack(np.meshgrid(np.linspace(0, 1, 161), np.linspace(0, 1, 161)), axis=-1).reshape(-1, 2)
+        lch = np.column_stack([grid[:, 0] * (100 if method == "lab" else 1), grid[:, 1] * C, np.full(len(grid), h)])
+        lab = colorimetry.lch_to_lab(lch)
+        if method == "lab":
+            linear = colorimetry.lab_to_linear(lab, SRGB)
+        else:
+            linear = colour.Oklab_to_XYZ(lab) @ SRGB.from_xyz.T
+        held = linear[(linear.min(axis=1) >= 0) & (linear.max(axis=1) <= 1)]
+        wanted = colorimetry.linear_to_lab(target, SRGB)
+        best = colorimetry.delta_e_2000(wanted, colorimetry.linear_to_lab(held, SRGB)).min()
+        assert found.difference <= best + 0.02
+        assert found.difference > 1
+
+
+def test_nearest_is_nearer_than_the_way_to_grey():
+    colors = colorimetry.lab_to_linear(np.array([[60.0, -80, 20], [50, 0, -110], [40, 90, 60]]), SRGB)
+    grey = colors.astype(np.float32)
+    gamut.fit_to_gamut(grey)
+    away = colorimetry.delta_e_2000(*(colorimetry.linear_to_lab(c, SRGB) for c in (colors, grey.astype(float))))
+    assert (gamut.nearest(colors).difference < away).all()
+
+
+def test_marking():
+    picture = np.full((4, 5, 3), 0.5, np.float32)
+    picture[1, 2, 0] = 1.1
+    before = picture.copy()
+    shown, share = gamut.marked(picture, (0, 1, 0))
+    assert share == 1 / 20
+    np.testing.assert_array_equal(shown[1, 2], [0, 1, 0])
+    np.testing.assert_array_equal(np.delete(shown.reshape(-1, 3), 7, axis=0), 0.5)
+    np.testing.assert_array_equal(picture, before)

@@ -7,7 +7,7 @@ import pytest
 from dyehouse.core import DyehouseError, Picture, transfer
 from dyehouse.core.colorspace import SPACES, SRGB
 from dyehouse.core.errors import MaskError, RecipeError, ReferenceColorError, TargetError, WhiteError
-from dyehouse.core.recipe import Recipe, Region, prepare, with_target
+from dyehouse.core.recipe import Colorway, Recipe, Region, prepare, with_colorway, with_target
 from dyehouse.core.recolor import recolor
 from dyehouse.core.spectra import Spectrum
 from dyehouse.core.swatches import Swatch, parse_target
@@ -332,3 +332,59 @@ def test_eight_bit_pictures_too(product):
     wanted = scene.in_color(np.array([0.06, 0.14, 0.42]), scene.white)
     inside = (scene.mask == 1) & (wanted.max(axis=-1) < 0.9)
     assert np.abs(result - wanted)[inside].max() < 0.03
+
+
+# --- colorways ------------------------------------------------------------------------------------------------
+
+
+def test_a_colorway_is_a_recipe_with_its_targets(product):
+    first, second = product((0.42, 0.09, 0.05)), product((0.05, 0.12, 0.45))
+    picture = Picture(np.concatenate([first.image, second.image], axis=1))
+    left = np.concatenate([first.mask, 0 * second.mask], axis=1)
+    right = np.concatenate([0 * first.mask, second.mask], axis=1)
+    navy = Colorway("navy", (RGB, None))
+    recipe = Recipe((Region(RED, mask=left), Region(RED, mask=right)), colorways=(navy,))
+    prepared = prepare(picture, recipe).for_colorway(navy)
+    alone = prepare(picture, with_colorway(recipe, navy))
+    assert [r.target for r in prepared.recipe.regions] == [RGB, None]
+    result, _ = recolor(picture, prepared.regions())
+    np.testing.assert_array_equal(result, recolor(picture, alone.regions())[0])
+    # A region without a target stays as it is to the last bit.
+    np.testing.assert_array_equal(result[:, 96:], second.image)
+    assert np.abs(result[:, :96] - first.image).max() > 0.1
+
+
+def test_a_recipe_may_leave_its_targets_to_colorways(product):
+    scene = product()
+    recipe = Recipe((Region(reference=scene.matte),), colorways=(Colorway("red", (RED,)),))
+    prepared = prepare(Picture(scene.image), recipe)
+    result, _ = recolor(Picture(scene.image), prepared.for_colorway(recipe.colorways[0]).regions())
+    wanted, _ = recolor(Picture(scene.image), prepare(Picture(scene.image), with_target(recipe, RED)).regions())
+    np.testing.assert_array_equal(result, wanted)
+
+
+def test_a_colorway_that_does_not_fit(product):
+    recipe = Recipe(one(), colorways=(Colorway("navy", (RED, RED)),))
+    with pytest.raises(RecipeError, match="Colorway 'navy': 2 targets are given for 1 regions"):
+        prepare(Picture(product().image), recipe)
+
+
+def test_warnings_name_a_region_by_its_name(product):
+    dull = product((0.4, 0.4, 0.4))
+    regions = (Region(RED, reference=(0.4, 0.1, 0.05)), Region(RED, mask=dull.mask, name="lid"))
+    prepared = prepare(Picture(dull.image), Recipe(regions))
+    assert all(w.startswith("Region 'lid': ") for w in prepared.warnings)
+
+
+def test_more_clicks_make_one_region():
+    image = np.full((100, 150, 3), [0.2, 0.25, 0.5], np.float32)
+    image[:, :50], image[:, 100:] = [0.5, 0.1, 0.05], [0.5, 0.3, 0.05]
+    red, blue, yellow = (20, 50), (75, 50), (130, 50)
+
+    def covered(**clicks):
+        mask = prepare(Picture(image), Recipe(one(**clicks))).analyses[0].mask
+        return [mask[y, x] == 255 for x, y in (red, blue, yellow)]
+
+    assert covered(click=red) == [True, False, False]
+    assert covered(click=red, added=(yellow,)) == [True, False, True]
+    assert covered(reference=red, mask="click", added=(blue, yellow), removed=(blue,)) == [True, False, True]

@@ -91,6 +91,70 @@ def test_no_region_and_an_empty_one_leave_the_picture():
         assert shares.out_of_gamut == 0
 
 
+# --- corrections ----------------------------------------------------------------------------------------------
+
+WIDE = np.hstack([M1, [[0.5, -0.2], [0.1, 0.4], [0.0, 0.3]]])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize("threads", [1, 3])
+def test_corrections_are_further_channels_of_the_pixel(dtype, masked, threads):
+    height, width = 9 * BAND_PIXELS // 401 + 5, 401  # some bands, and odd
+    image = RNG.random((height, width, 3), dtype=np.float32)
+    extra = RNG.normal(0, 0.1, (height, width, 2)).astype(dtype)
+    extra[: height // 2] = 0  # bands without any
+    mask = blob(height, width, 300, 200, 150, soft=20) if masked else np.ones((height, width))
+    region = RegionMatrix(WIDE, mask if masked else None, extra=extra)
+    result, shares = recolor(Picture(image), [region], threads=threads)
+    whole = np.concatenate([image, extra], axis=2).astype(float) @ WIDE.T
+    np.testing.assert_allclose(result, image + mask[..., None] * (whole - image), atol=1e-5)
+    assert shares.pixels == np.count_nonzero(mask)
+
+
+def test_corrections_of_zero_change_no_bit():
+    image = RNG.random((60, 70, 3), dtype=np.float32)
+    none = np.zeros((60, 70, 2), np.float32)
+    for mask in (None, blob(60, 70, 30, 35, 20)):
+        plain, _ = recolor(Picture(image), [RegionMatrix(M1, mask)])
+        result, _ = recolor(Picture(image), [RegionMatrix(WIDE, mask, extra=none)])
+        np.testing.assert_array_equal(result, plain)
+
+
+def test_corrections_of_overlapping_regions():
+    image, extra = RNG.random((40, 60, 3), dtype=np.float32), RNG.random((40, 60, 2), dtype=np.float32)
+    low, high = blob(40, 60, 20, 25, 15), blob(40, 60, 20, 38, 12)
+    result, _ = recolor(Picture(image), [RegionMatrix(WIDE, low, extra=extra), RegionMatrix(M2, high)])
+    seen = np.minimum(low, 1 - high)[..., None]
+    corrected = np.concatenate([image, extra], axis=2) @ WIDE.T
+    expected = image + high[..., None] * (image @ M2.T - image) + seen * (corrected - image)
+    np.testing.assert_allclose(result, expected, atol=1e-5)
+
+
+def test_corrections_count_by_coverage_where_the_edge_is_unmixed(product):
+    scene = product()
+    scene.mask = blob(96, 96, 48, 48, 40, soft=6)
+    plain = analyze(scene.image, reference=scene.body, mask=scene.mask).region((0.05, 0.3, 0.2))
+    extra = RNG.random((96, 96, 1), dtype=np.float32)
+    column = np.array([[0.2], [0.1], [-0.1]])
+    assert plain.edge is not None
+    corrected = RegionMatrix(np.hstack([plain.matrix, column]), plain.mask, plain.edge, extra)
+    added = recolor(Picture(scene.image), [corrected])[0] - recolor(Picture(scene.image), [plain])[0]
+    np.testing.assert_allclose(added, scene.mask[..., None] * extra * column[:, 0], atol=1e-6)
+
+
+def test_corrections_reach_codes_and_their_gamut():
+    image = np.full((40, 40, 3), 0.3, np.float32)
+    codes = transfer.encode(image, transfer.SRGB, np.uint8)
+    extra = np.zeros((40, 40, 1), np.float32)
+    extra[:10] = 1.0
+    region = RegionMatrix(np.hstack([np.eye(3), [[0.2], [0.8], [0.0]]]), extra=extra)
+    result, shares = recolor(Picture(codes, transfer.SRGB), [region], curve=transfer.SRGB, dtype=np.uint8)
+    assert shares.out_of_gamut == pytest.approx(0.25)
+    np.testing.assert_array_equal(result[10:], codes[10:])
+    assert (result[:10, :, 1] > codes[:10, :, 1]).all()
+
+
 # --- bands and threads ----------------------------------------------------------------------------------------
 
 

@@ -86,16 +86,33 @@ def test_no_reference_in_black_or_clipped_pictures(product):
 # --- a clicked reference --------------------------------------------------------------------------------------
 
 
-def test_reference_at_says_how_glossy_it_is(product):
+@pytest.mark.parametrize("masked", [True, False])
+@pytest.mark.parametrize("share", [0.02, 0.08, 0.2, 0.4])
+def test_gloss_under_a_click_is_found_and_left_out(product, share, masked):
     scene = product(size=200, noise=0.001, white=(1.1, 1.0, 0.6))
-    for share in (0.08, 0.2, 0.4):
-        off = np.where(scene.mask == 1, np.abs(scene.gloss - share), np.inf)
-        y, x = np.unravel_index(np.argmin(off), off.shape)
-        found = r.reference_at(Picture(scene.image), (int(x), int(y)), scene.white, scene.mask)
-        assert found.pixel == (x, y)
-        assert found.gloss == pytest.approx(share, abs=0.03)
-    matte = r.reference_at(Picture(scene.image), scene.matte, scene.white, scene.mask)
-    assert matte.gloss < 0.02
+    off = np.where(scene.mask == 1, np.abs(scene.gloss - share), np.inf)
+    y, x = np.unravel_index(np.argmin(off), off.shape)
+    mask = scene.mask if masked else None
+    read, found = (f(Picture(scene.image), (int(x), int(y)), scene.white, mask) for f in (r.reference_at, r.matte_at))
+    assert read.pixel == found.pixel == (x, y)
+    assert read.gloss == 0
+    assert found.gloss == pytest.approx(share, abs=0.1 * share + 0.004)
+    np.testing.assert_allclose(found.color, read.color - found.gloss * scene.white)
+    assert angle(found.color, scene.body) < 1.5
+
+
+def test_a_matte_click_is_taken_as_it_is_read(product):
+    scene = product(size=200, noise=0.001)
+    read, found = (f(Picture(scene.image), scene.matte, scene.white, scene.mask) for f in (r.reference_at, r.matte_at))
+    assert found.gloss == 0
+    np.testing.assert_array_equal(found.color, read.color)
+
+
+def test_gloss_under_a_click_does_not_depend_on_exposure(product):
+    scene = product(size=128)
+    y, x = np.unravel_index(np.argmin(np.where(scene.mask == 1, np.abs(scene.gloss - 0.01), 9)), scene.mask.shape)
+    one, four = (r.matte_at(Picture(k * scene.image), (x, y), scene.white, scene.mask) for k in (1, 4))
+    np.testing.assert_allclose(four.color, 4 * one.color, rtol=1e-5)
 
 
 def test_window_is_kept_inside_picture_and_mask():

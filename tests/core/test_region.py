@@ -11,7 +11,7 @@ from scipy import ndimage
 from dyehouse.core import Picture, transfer
 from dyehouse.core.errors import MaskError, ReferenceColorError
 from dyehouse.core.reference import white_at
-from dyehouse.core.region import label, region_at
+from dyehouse.core.region import label, region_at, region_from_clicks
 
 
 def iou(a, b):
@@ -334,3 +334,65 @@ def test_click_on_a_pixel_that_is_not_finite(product):
     scene.image[40, 41] = np.nan
     with pytest.raises((MaskError, ReferenceColorError), match="finite"):
         region_at(Picture(scene.image), (41, 40))
+
+
+# --- several clicks -------------------------------------------------------------------------------------------
+
+
+def two_materials():
+    """Red beside yellow on blue, with soft outlines."""
+    y, x = np.mgrid[:120, :200].astype(float)
+    cover = np.clip(np.minimum(np.minimum(x - 30, 170 - x), np.minimum(y - 30, 90 - y)) / 2 + 0.5, 0, 1)[..., None]
+    left = np.clip((100 - x) / 2 + 0.5, 0, 1)[..., None]
+    product = left * np.array([0.5, 0.1, 0.05]) + (1 - left) * np.array([0.45, 0.35, 0.04])
+    image = cover * product + (1 - cover) * np.array([0.1, 0.3, 0.5])
+    return Picture(image.astype(np.float32)), cover[..., 0]
+
+
+def test_an_added_click_adds_its_material_without_a_seam():
+    picture, cover = two_materials()
+    both = region_from_clicks(picture, (50, 60), [(150, 60)])
+    assert (both[40:80, 40:160] == 255).all()  # over the seam at 100 too
+    assert np.abs(both / 255 - cover).max() < 0.2
+    assert np.abs(both / 255 - cover).mean() < 0.005
+    np.testing.assert_array_equal(region_from_clicks(picture, (50, 60)), region_at(picture, (50, 60)))
+
+
+def test_a_removed_click_takes_its_material_away():
+    picture, _ = two_materials()
+    red = region_from_clicks(picture, (50, 60), [(150, 60)], [(140, 70)])
+    alone = region_at(picture, (50, 60))
+    assert (red[:, 104:] == 0).all()
+    assert iou(red, alone) > 0.99
+
+
+def test_a_removed_click_takes_out_a_part_that_a_jump_brought():
+    picture = two_squares(2)
+    assert region_at(picture, (80, 100))[100, 200] == 255
+    blue = region_from_clicks(picture, (10, 10), [(80, 100)], [(200, 100)])
+    assert blue[100, 80] == blue[100, 200] == 0
+    assert blue[10, 10] == 255
+
+
+def test_clicks_on_the_suit_and_the_flag(astronaut, suit):
+    picture = Picture(astronaut, transfer.SRGB)
+    patch = region_at(picture, (165, 370))
+    with_patch = region_from_clicks(picture, (100, 350), [(165, 370)])
+    assert (suit[(with_patch < 128) & (patch < 128)] < 128).mean() > 0.995
+    assert with_patch[370, 165] == 255
+    again = region_from_clicks(picture, (100, 350), [(165, 370)], [(165, 370)])
+    assert again[370, 165] == 0
+    check(again, [(100, 350), (170, 312)], {k: v for k, v in NOT_SUIT.items() if k in ("skin", "flag")})
+
+
+def test_nothing_left_of_a_region(product):
+    scene = product(size=200, noise=0.001)
+    with pytest.raises(MaskError, match="leave nothing of the region: drop one"):
+        region_from_clicks(Picture(scene.image), scene.matte, removed=[scene.matte])
+
+
+def test_every_click_is_checked(product):
+    scene = product()
+    for clicks in ({"added": [(500, 3)]}, {"removed": [(500, 3)]}):
+        with pytest.raises(ReferenceColorError, match=r"Click \(500, 3\) lies outside"):
+            region_from_clicks(Picture(scene.image), scene.matte, **clicks)

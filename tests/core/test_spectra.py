@@ -31,6 +31,7 @@ def test_shipped_tables_are_what_the_export_writes():
         for name, table in fresh.items():
             np.testing.assert_array_equal(shipped[name], table)
     assert export_tables.OUTPUT.stat().st_size < 300_000
+    assert export_tables.CSS_OUTPUT.read_text() == export_tables.css()
 
 
 @pytest.mark.parametrize("observer", ["1931", "1964"])
@@ -108,6 +109,70 @@ def test_black_body(kelvin):
     expected = colour.sd_blackbody(kelvin, colour.SpectralShape(300, 830, 1))
     light = spectra.illuminant(kelvin)
     np.testing.assert_allclose(light.values, 100 * expected.values / expected[560], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "kelvin"), [("blackbody 6500K", 6500), ("Black Body 40000", 40000), ("BLACKBODY700K", 700)]
+)
+def test_black_body_of_any_temperature(text, kelvin):
+    light = spectra.illuminant(text)
+    expected = colour.sd_blackbody(kelvin, colour.SpectralShape(300, 830, 1))
+    np.testing.assert_allclose(light.values, 100 * expected.values / expected[560], rtol=1e-6)
+    assert spectra.illuminant(light.name) == light
+    assert spectra.illuminant("daylight 5600K") == spectra.illuminant("5600K")
+
+
+@pytest.mark.parametrize(
+    ("text", "shares"),
+    [
+        ("0.7 D65 + 0.3 A", (0.7, 0.3)),
+        ("70% d65+30%A", (0.7, 0.3)),
+        ("7*D65 + 3 * A", (0.7, 0.3)),
+        ("D65 + A", (0.5, 0.5)),
+        ("6500.5K + 2856 K", None),
+    ],
+)
+def test_mixture_of_lights(text, shares):
+    light = spectra.illuminant(text)
+    assert spectra.illuminant(light.name) == light
+    if shares is not None:
+        # By luminance: the white is the mean of the two whites of Y = 1.
+        expected = [
+            s * their_xyz(colour.sd_ones(), colour.SDS_ILLUMINANTS[n])
+            for s, n in zip(shares, ("D65", "A"), strict=True)
+        ]
+        np.testing.assert_allclose(spectra.to_xyz(light), np.sum(expected, axis=0), atol=1e-6)
+
+
+def test_measured_light(tmp_path):
+    lamp = colour.SDS_ILLUMINANTS["LED-B3"]
+    rows = "\n".join(f"{nm:g},{value:.9g}" for nm, value in zip(lamp.wavelengths, lamp.values, strict=True))
+    path = tmp_path / "my+lamp.csv"
+    path.write_text("nm,power\n" + rows)
+    np.testing.assert_allclose(spectra.to_xyz(str(path)), spectra.to_xyz("LED-B3"), atol=1e-6)
+    plain = tmp_path / "lamp.csv"
+    plain.write_text(rows)
+    mixed = spectra.to_xyz(f"0.5 {plain} + 0.5 A")
+    np.testing.assert_allclose(mixed, (spectra.to_xyz("LED-B3") + spectra.to_xyz("A")) / 2, atol=1e-6)
+    plain.write_text(rows.replace(f"{lamp.wavelengths[9]:g},", f"{lamp.wavelengths[9]:g},-"))
+    with pytest.raises(FileError, match="below 0"):
+        spectra.illuminant(str(plain))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("0.7 D65 + A", "lacks a share"),
+        ("0 D65 + 0 A", "lacks a share"),
+        ("D65 + moonshine", "moonshine"),
+        ("D65 +", "is not known"),
+        ("blackbody 100K", "500 to 100000"),
+        ("daylight 3000K", "4000 to 25000"),
+    ],
+)
+def test_mixtures_and_temperatures_that_make_no_sense(text, said):
+    with pytest.raises(WhiteError, match=said):
+        spectra.illuminant(text)
 
 
 def test_untabulated_daylight_is_nominal():

@@ -91,7 +91,7 @@ def test_predicted_error_grows_with_what_the_model_does_not_explain(product):
     image = scene.image.copy()
     normal = np.cross(scene.body, scene.white)
     image[:, :30] += (0.02 * normal / np.linalg.norm(normal)).astype(np.float32)
-    analysis = analyze(image, scene.white, scene.body, scene.mask)
+    analysis = analyze(image, scene.white, scene.body, scene.mask, "dichromatic")
     error = analysis.predicted_error((0.05, 0.1, 0.4))
     inside = scene.mask == 1
     spoiled, sound = inside.copy(), inside.copy()
@@ -104,7 +104,7 @@ def test_predicted_error_is_the_difference_between_keeping_and_dropping_the_resi
     scene = product(noise=0.0, gloss=0.0)
     image = scene.image.copy()
     image[..., 2] *= 1.5
-    analysis = analyze(image, reference=scene.body, mask=scene.mask)
+    analysis = analyze(image, reference=scene.body, mask=scene.mask, model="dichromatic")
     target = (0.1, 0.3, 0.2)
     kept, dropped = (
         colour.XYZ_to_Lab(analysis.recolor(target, residual=rule) @ SRGB.to_xyz.T, (0.3127, 0.3290))

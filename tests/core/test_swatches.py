@@ -2,6 +2,7 @@
 
 import re
 
+import colour
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +12,7 @@ from dyehouse.core import colorimetry, spectra, swatches
 from dyehouse.core.colorspace import SPACES, SRGB
 from dyehouse.core.errors import TargetError, WhiteError
 from dyehouse.core.spectra import Spectrum
-from dyehouse.core.swatches import Linear, Swatch, parse_target
+from dyehouse.core.swatches import Encoded, Linear, Swatch, parse_target
 
 P3, PROPHOTO, ACES, REC2020 = (SPACES[name] for name in ("display-p3", "prophoto", "acescg", "rec2020"))
 RED = spectra.chart()["red"]
@@ -128,6 +129,14 @@ MALFORMED = [
     ("xyy(0.3, 0, 0.2)", "at most 1"),
     ("missing.csv", "cannot be read"),
     ("spectrum(missing.csv)", "cannot be read"),
+    ("color(srgb 192 57 43)", "#C0392B"),
+    ("color(moonlight 0.1 0.2 0.3)", "moonlight"),
+    ("lab(50, 20, 30 / 0.9 0 1)", "above 0"),
+    ("reflectance(400:0.1)", "no reflectance"),
+    ("reflectance(500:0.1, 400:0.2)", "increasing"),
+    ("reflectance(400:0.1, 700:0.2 x)", "no reflectance"),
+    ("reflectance(400:10, 700:20)", "divide percent by 100"),
+    ("nothing#x", "is no file"),
 ]
 
 
@@ -150,7 +159,7 @@ def test_any_text_is_a_swatch_or_a_target_error(text):
 
 def write(path, spectrum, scale=1.0):
     rows = zip(spectrum.wavelengths, scale * spectrum.values, strict=True)
-    path.write_text("nm,R\n" + "\n".join(f"{nm},{value!r}" for nm, value in rows))
+    path.write_text("nm,R\n" + "\n".join(f"{nm},{float(value)!r}" for nm, value in rows))
 
 
 @pytest.mark.parametrize("form", ["red.csv", "spectrum(red.csv)", "spectrum( 'red.csv' )"])
@@ -264,6 +273,68 @@ def test_text_of_a_made_swatch_reads_back():
         assert parse_target(str(swatch)) == swatch
 
 
+ALL_KINDS = [
+    parse_target("#C0392B"),
+    Swatch("Float codes", Encoded((0.123456789, 0.5, 0.9))),
+    Swatch("P3", Encoded((0.9, -0.01, 0.1), "display-p3")),
+    parse_target("rgb(0.5, 0.04, -0.02)"),
+    Swatch.from_lab((42, 55, 35), "D65", "1964"),
+    Swatch.from_lab((42, 55, 35), "0.7 D65 + 0.3 A"),
+    Swatch.from_lab((42, 55, 35), 3200),
+    Swatch.from_lab((102, -1, 2), "C"),
+    Swatch.from_xyz((0.2, 0.12, 0.05), Spectrum(np.array([380.0, 780.0]), np.array([1.0, 3.0]), "lamp")),
+    Swatch.from_spectrum(RED),
+]
+
+
+@pytest.mark.parametrize("swatch", ALL_KINDS, ids=lambda swatch: swatch.kind)
+def test_what_is_written_is_the_same_color(swatch):
+    again = parse_target(swatch.written)
+    assert again.written == swatch.written
+    assert type(again.color) is type(swatch.color)
+    for space in (SRGB, PROPHOTO):
+        close(again.to_linear(space), swatch.to_linear(space))
+        close(again.to_linear(space, "A"), swatch.to_linear(space, "A"))
+
+
+def test_swatches_keep_what_they_were_given_as():
+    assert parse_target("lab(42 55 35 / F11 10)").color.illuminant == "FL11"
+    assert parse_target("lab(42 55 35 / F11 10)").color.observer == "1964"
+    assert parse_target("#C0392B").kind == "sRGB codes"
+    assert "F11" not in parse_target("#C0392B").kind
+    assert ALL_KINDS[8].color.illuminant == ""
+    assert "81 steps" in ALL_KINDS[9].kind
+
+
+def test_fate_says_what_is_done():
+    red, lab = Swatch.from_spectrum(RED), parse_target("lab(42 55 35)")
+    assert "integrated under A for the CIE 1964" in red.fate(SRGB, "A", "1964")
+    assert "integrated under D65 with the sensitivities of Nikon" in red.fate(SRGB, camera="nikon")
+    assert "adapted to the white of sRGB by CAT16" in red.fate(SRGB)
+    assert "under D50, 2° observer is adapted to the white of sRGB by Bradford" in lab.fate(SRGB, adaptation="bradford")
+    assert "as it is" in parse_target("rgb(.1 .2 .3)").fate(SRGB)
+
+
+@pytest.mark.parametrize("method", ["cat16", "bradford"])
+@pytest.mark.parametrize("space", [SRGB, P3, ACES, REC2020, PROPHOTO], ids=lambda space: space.name)
+def test_conversion_against_colour_science(space, method):
+    theirs = {"cat16": "CAT16", "bradford": "Bradford"}[method]
+    whites = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]
+    target = colour.xy_to_XYZ(colour.XYZ_to_xy(space.white))
+    for name in ("D50", "D65"):
+        white = colour.xy_to_XYZ(whites[name])
+        xyz = colour.Lab_to_XYZ([42, 55, 35], whites[name])
+        adapted = colour.adaptation.chromatic_adaptation_VonKries(xyz, white, target, transform=theirs)
+        close(Swatch.from_lab((42, 55, 35), name).to_linear(space, adaptation=method), space.from_xyz @ adapted, 1e-6)
+    sd = colour.SpectralDistribution(RED.values, RED.wavelengths)
+    for light in ("A", "FL11", "LED-B3"):
+        for observer in ("1931", "1964"):
+            cmfs = colour.MSDS_CMFS[f"CIE {observer} {'2' if observer == '1931' else '10'} Degree Standard Observer"]
+            xyz = colour.sd_to_XYZ(sd, cmfs, colour.SDS_ILLUMINANTS[light], method="Integration") / 100
+            ours = Swatch.from_spectrum(RED).to_linear(space, light, observer)
+            close(ours, space.from_xyz @ xyz, 1e-6)
+
+
 def test_swatches_compare_by_value():
     assert parse_target("#C0392B") == parse_target("#C0392B")
     assert len({parse_target("#C0392B"), parse_target("#C0392B"), Swatch("x", Linear((1, 0, 0)))}) == 2
@@ -273,7 +344,7 @@ def test_swatches_compare_by_value():
 def test_documented_examples_are_accepted():
     first_columns = re.findall(r"^(``.*?)  ", swatches.__doc__, re.MULTILINE)
     examples = [text for column in first_columns for text in re.findall(r"``([^`]+)``", column)]
-    assert len(examples) == 8
+    assert len(examples) == 11
     for text in examples:
-        if not text.endswith(".csv"):
+        if not text.endswith((".csv", "...)")):
             assert np.isfinite(parse_target(text).to_linear(SRGB)).all()

@@ -51,7 +51,9 @@ def errors(scene, model="auto"):
     found = []
     for pair in pairs(scene, FAST, COLORS):
         analysis = analyze(pair.photo, pair.white, pair.view.reference, pair.view.mask, model)
-        found.append(pair.errors(analysis.recolor(pair.color(pair.truth))))
+        # Read at the same place of the true picture, with what gloss is there.
+        target = analysis.matte_target(pair.color(pair.truth))
+        found.append(pair.errors(analysis.recolor(target)))
     return np.concatenate(found)
 
 

@@ -1,0 +1,118 @@
+"""The journal of a run: a line of JSON for each result, from which a run that was stopped goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import IO, Any
+
+from ..core.errors import FileError
+
+# Seconds to wait for the workers of a run that has just been killed.
+_PATIENCE = 20.0
+
+
+class Journal:
+    """The journal of one output folder, open for appending and locked against other runs.
+
+    Parameters
+    ----------
+    path
+        The file; made if it is not there.
+
+    Attributes
+    ----------
+    entries
+        The last entry of each result, by its output.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read or written, or another run is using it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._file: IO[bytes] = path.open("a+b")
+        except OSError as error:
+            raise FileError(f"The journal '{path}' cannot be written ({error.strerror}): check the folder.") from None
+        try:
+            _lock(self._file, path, alone=True)
+        except FileError:
+            self._file.close()
+            raise
+        self.entries: dict[str, dict[str, Any]] = {}
+        self._file.seek(0)
+        data = self._file.read()
+        for line in data.splitlines():
+            try:
+                entry = json.loads(line)
+                self.entries[entry["output"]] = entry
+            except (ValueError, KeyError, TypeError):
+                continue  # a line that was being written when the machine stopped
+        if data and not data.endswith(b"\n"):
+            self._file.write(b"\n")
+
+    def share(self) -> None:
+        """Let the workers of this run in, too."""
+        _lock(self._file, self.path, alone=False)
+
+    def add(self, entries: Iterable[dict[str, Any]]) -> None:
+        """Append entries; they are on the disk when this returns.
+
+        Raises
+        ------
+        FileError
+            If they cannot be written.
+        """
+        lines = []
+        for entry in entries:
+            self.entries[entry["output"]] = entry
+            lines.append(json.dumps(entry, ensure_ascii=False) + "\n")
+        try:
+            self._file.write("".join(lines).encode(errors="surrogateescape"))
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise FileError(
+                f"The journal '{self.path}' cannot be written ({error.strerror}): make room, then go on with --resume."
+            ) from None
+
+    def close(self) -> None:
+        """Close the file and give up the lock."""
+        with contextlib.suppress(OSError):  # what could not be written has been told already
+            self._file.close()
+
+
+def hold(path: str) -> IO[bytes] | None:
+    """Share the lock of a journal from another process, for as long as the returned file is open."""
+    try:
+        file = Path(path).open("rb")  # noqa: SIM115, it stays open
+    except OSError:
+        return None
+    _lock(file, Path(path), alone=False)
+    return file
+
+
+def _lock(file: IO[bytes], path: Path, *, alone: bool) -> None:
+    try:
+        import fcntl
+    except ImportError:  # Windows refuses to replace files that another run has open
+        return
+    kind = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
+    until = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            fcntl.flock(file, kind | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            if time.monotonic() > until:
+                raise FileError(f"Another run is writing to '{path.parent}': wait for it, or stop it.") from None
+            time.sleep(0.05)
+        except OSError:  # a file system without locks
+            return

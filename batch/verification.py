@@ -1,0 +1,271 @@
+"""Was the asked color delivered? The written file is read back and its product compared with the swatch.
+
+What is compared is the product's matte color, as the method has it: pixels of the photo whose body reflection is about
+that of the reference and which hold almost no gloss. In the file each is divided by its share A of body reflection,
+after its gloss B has been taken away, and the trimmed mean of all is set against the color that the reference shall
+have. The photo decides which pixels these are, so the area is chosen before the photo's pixels are spent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..core import colorimetry, dichromatic, gamut
+from ..core.analysis import Analysis
+from ..core.colorspace import RGBSpace
+from ..core.errors import FileError
+from ..core.picture import Picture, as_weights
+from ..core.recipe import Prepared
+from ..core.recolor import RegionMatrix
+from ..core.reference import check_pixel, read_window, trimmed_mean, window_radius
+from ..core.swatches import Camera, Light, Swatch
+from . import files
+
+# Pixels that are looked at for matte ones, and how near to the reference they are: A around 1, B as a share of white.
+_CANDIDATES = 60_000
+_BODY, _GLOSS = 0.2, 0.02
+_FEWEST = 25
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """Asked and delivered color of one region.
+
+    Attributes
+    ----------
+    target
+        The swatch as its user wrote it, or None for an unchanged color.
+    asked, delivered
+        (3,) L*a*b* under the white of the photo's and the file's color space.
+    limit
+        CIEDE2000 from the asked color to the nearest one that the file can hold; 0 where it holds it.
+    pixels
+        How many were averaged.
+    """
+
+    target: str | None
+    asked: NDArray[np.float64]
+    delivered: NDArray[np.float64]
+    limit: float
+    pixels: int
+
+    @property
+    def ciede2000(self) -> float:
+        """CIEDE2000 between asked and delivered."""
+        return float(colorimetry.delta_e_2000(self.asked, self.delivered))
+
+    def cmc(self, lightness: float) -> float:
+        """CMC(l:1) of delivered against asked: 2 for acceptability, 1 for perceptibility."""
+        return float(colorimetry.delta_e_cmc(self.asked, self.delivered, lightness))
+
+    @property
+    def sentence(self) -> str:
+        """The figures in words."""
+        text = (
+            f"Delivered {self.ciede2000:.1f} of the asked color (CIEDE2000 {self.ciede2000:.2f}, CMC(2:1) "
+            f"{self.cmc(2):.2f}, CMC(1:1) {self.cmc(1):.2f}; {self.pixels} matte pixels)"
+        )
+        if self.limit > 0:
+            text += f"; the nearest color that the file can hold is {self.limit:.1f} away"
+        return text + "."
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "target": self.target,
+            "asked_lab": self.asked.tolist(),
+            "delivered_lab": self.delivered.tolist(),
+            "ciede2000": self.ciede2000,
+            "cmc_2_1": self.cmc(2),
+            "cmc_1_1": self.cmc(1),
+            "limit_ciede2000": self.limit,
+            "pixels": self.pixels,
+            "sentence": self.sentence,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class _Area:
+    """Matte pixels of a region, and the linear RGB that the product shall have there."""
+
+    target: str | None
+    asked: NDArray[np.float64]
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    body: NDArray[np.float32]
+    gloss: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """What a file that is yet to be written should show.
+
+    Attributes
+    ----------
+    space
+        RGB space of the asked colors.
+    white
+        (3,) W' of the new picture.
+    areas
+        One for each region that has matte pixels.
+    """
+
+    space: RGBSpace
+    white: NDArray[np.float64]
+    areas: tuple[_Area, ...]
+
+    def check(self, path: str | Path) -> list[Verification]:
+        """Read the file back and compare.
+
+        Parameters
+        ----------
+        path
+            As written by `photo.save`.
+
+        Returns
+        -------
+        One for each region that has matte pixels.
+
+        Raises
+        ------
+        FileError
+            If it cannot be read back, or has another size.
+        """
+        back = files.read(path)
+        picture = Picture(back.pixels, back.space.curve)
+        to_own = colorimetry.conversion_matrix(self.space, back.space)
+        return [_compare(area, picture, back, to_own @ area.asked, to_own @ self.white) for area in self.areas]
+
+
+def _compare(area: _Area, picture: Picture, back: files.Photo, asked: NDArray, white: NDArray) -> Verification:
+    height, width = picture.shape
+    if area.rows.max() >= height or area.columns.max() >= width:
+        raise FileError(f"'{back.path}' is {width} x {height} pixels, less than was written: write it again.")
+    pixels = picture.at(area.rows, area.columns)
+    if back.premultiplied and back.pixels.shape[2] == 4:
+        pixels = pixels / back.pixels[area.rows, area.columns, 3:].astype(np.float32)
+    matte = (pixels - area.gloss[:, None] * white) / area.body[:, None]
+    return _verification(area.target, asked, trimmed_mean(matte), back, len(matte))
+
+
+def _verification(
+    target: str | None, asked: NDArray, delivered: NDArray, back: files.Photo, pixels: int
+) -> Verification:
+    asked_lab, delivered_lab = (colorimetry.linear_to_lab(color, back.space) for color in (asked, delivered))
+    limit = float(gamut.nearest(asked, back.space).difference) if back.pixels.dtype.kind == "u" else 0.0
+    return Verification(target, asked_lab, delivered_lab, limit, pixels)
+
+
+def expect(photo: files.Photo, prepared: Prepared, swatches: Sequence[Swatch | None] | None = None) -> Expectation:
+    """Note what a recolor should deliver, and where to look for it.
+
+    Parameters
+    ----------
+    photo, prepared
+        The opened photo and what was made of it, its pixels not yet reused.
+    swatches
+        Targets of this colorway; None for the recipe's own.
+    """
+    alpha = photo.pixels[..., 3] if photo.pixels.shape[2] == 4 else None
+    chosen = swatches or [None] * len(prepared.analyses)
+    areas = []
+    for k, analysis in enumerate(prepared.analyses):
+        swatch = chosen[k] or prepared.recipe.regions[k].target
+        covers = [later.mask for later in prepared.analyses[k + 1 :]]
+        rows, columns, body, gloss = _matte_pixels(analysis, covers, alpha)
+        if len(rows):
+            asked = prepared.target(k, chosen[k])
+            areas.append(_Area(str(swatch) if swatch else None, asked, rows, columns, body, gloss))
+    return Expectation(prepared.space, np.asarray(prepared.target_white, np.float64), tuple(areas))
+
+
+def _matte_pixels(
+    analysis: Analysis, covers: Sequence[NDArray | None], alpha: NDArray | None
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32], NDArray[np.float32]]:
+    """Rows, columns, A and B of pixels of the region that look like its reference."""
+    empty = np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0, np.float32), np.empty(0, np.float32)
+    if any(cover is None for cover in covers):
+        return empty  # another region lies over all of it
+    picture = analysis.picture
+    rows, columns = _candidates(analysis)
+    keep = np.ones(len(rows), bool)
+    if analysis.mask is not None:
+        keep &= as_weights(analysis.mask[rows, columns]) == 1
+    for cover in covers:
+        keep &= as_weights(np.asarray(cover)[rows, columns]) == 0
+    if alpha is not None:
+        keep &= alpha[rows, columns] == (np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1)
+    rows, columns = rows[keep], columns[keep]
+    pixels = picture.at(rows, columns)
+    unclipped = pixels.max(axis=1, initial=0) < picture.clip_level
+    rows, columns, pixels = rows[unclipped], columns[unclipped], pixels[unclipped]
+    if not len(rows):
+        return empty
+    body, gloss = (
+        part[0] for part in dichromatic.fit(pixels[None], analysis.reference, analysis.white, analysis.model)
+    )
+    # As many as are alike; where a product is rough or noisy, the nearest.
+    unlike = np.maximum(np.abs(body - 1) / _BODY, np.abs(gloss) / _GLOSS)
+    order = np.argsort(unlike, kind="stable")
+    alike = order[: max(_FEWEST, int(np.count_nonzero(unlike < 1)))]
+    alike = alike[body[alike] > 0.1]
+    return rows[alike], columns[alike], body[alike], gloss[alike]
+
+
+def _candidates(analysis: Analysis) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pixels around the reference pixel, or on a grid over the region."""
+    height, width = analysis.picture.shape
+    if analysis.pixel is not None:
+        x, y = analysis.pixel
+        reach = 6 * window_radius(analysis.picture.shape)
+        box = slice(max(0, y - reach), min(height, y + reach + 1)), slice(max(0, x - reach), min(width, x + reach + 1))
+    else:
+        box = RegionMatrix(np.eye(3), analysis.mask).box or (slice(0, height), slice(0, width))
+    area = (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
+    step = max(1, int(np.sqrt(area / _CANDIDATES)))
+    rows, columns = np.mgrid[box[0].start : box[0].stop : step, box[1].start : box[1].stop : step]
+    return rows.ravel(), columns.ravel()
+
+
+def verify(
+    path: str | Path,
+    reference: ArrayLike,
+    target: Swatch,
+    *,
+    color_space: str | None = None,
+    illuminant: Light | None = None,
+    observer: str = "1931",
+    camera: Camera | None = None,
+    adaptation: colorimetry.Adaptation = "cat16",
+) -> Verification:
+    """Compare a picture's matte color at a pixel with a swatch.
+
+    Parameters
+    ----------
+    path
+        The picture.
+    reference
+        (x, y) of a matte pixel of the product; the small window around it is averaged without its outliers.
+    target
+        The asked color.
+    color_space
+        See :func:`files.read`.
+    illuminant, observer, camera, adaptation
+        See :meth:`Swatch.to_linear`.
+
+    Raises
+    ------
+    DyehouseError
+        If the picture cannot be read, or the pixel lies outside.
+    """
+    back = files.read(path, color_space)
+    picture = Picture(back.pixels, back.space.curve)
+    window = read_window(picture, check_pixel(picture, reference, "Reference pixel"))
+    asked = target.to_linear(back.space, illuminant, observer, camera, adaptation)
+    return _verification(str(target), asked, trimmed_mean(window), back, len(window))

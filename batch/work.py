@@ -1,0 +1,305 @@
+"""One photo of a catalog: decoded once, looked at once, and put into all its colorways."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import time
+from collections import OrderedDict
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import dichromatic, stability
+from ..core.errors import DyehouseError, FileError
+from ..core.picture import Picture
+from ..core.recipe import Colorway, Prepared
+from ..core.thumbnail import proxy_of, thumbnail
+from . import files, inspection, journal, photo, sheet, storage
+from .jobs import ASIDE, Job, Want
+
+# Pixels of a region from which its predicted error is told.
+_SAMPLE = 8_000
+
+# Width of a picture on a contact sheet, and pictures in a row.
+CELL, ACROSS = 320, 4
+
+type Entry = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A job and all that a worker anywhere needs to do it.
+
+    Attributes
+    ----------
+    job
+        The photo and what is wanted of it.
+    out
+        Output folder or URL.
+    known
+        Of an earlier run, the last entries of the job's outputs and sheet.
+    max_error
+        CIEDE2000 from which a result needs a person, at the 95th percentile of its region; None: never.
+    allow_warnings
+        Whether results with warnings need none.
+    sheets
+        Whether to make contact sheets.
+    threads
+        That one photo may use; None for one per core.
+    """
+
+    job: Job
+    out: str
+    known: dict[str, Entry] = field(default_factory=dict)
+    max_error: float | None = None
+    allow_warnings: bool = False
+    sheets: bool = True
+    threads: int | None = None
+
+
+# Masks that were used last, by what is in their files.
+_masks: OrderedDict[tuple[str, tuple[int, int]], NDArray] = OrderedDict()
+_MASKS = 2
+
+_held: list[IO[bytes]] = []
+
+
+def begin(journal_path: str, threads: int) -> None:
+    """Prepare a worker process of this machine."""
+    import OpenImageIO
+
+    OpenImageIO.attribute("threads", threads)
+    file = journal.hold(journal_path)
+    if file is not None:
+        _held.append(file)
+
+
+def perform_all(tasks: list[Task]) -> list[Entry]:
+    """Do several tasks one after the other; see :func:`perform`."""
+    return [entry for task in tasks for entry in perform(task)]
+
+
+def perform(task: Task) -> list[Entry]:
+    """Do what is missing or changed of one job.
+
+    Returns
+    -------
+    An entry for each result, and one for the contact sheet: plain values, see ``docs/catalog.md``. Nothing is raised:
+    what goes wrong with a photo is told in its entries.
+    """
+    try:
+        return _perform(task)
+    except MemoryError:
+        return failures(task, "there is not enough memory for this photo: use fewer --workers")
+    except DyehouseError as error:
+        return failures(task, str(error))
+    except Exception as error:  # one photo, or a fault of this program, never stops the others
+        return failures(task, f"this is a fault of Dyehouse, please report it: {type(error).__name__}: {error}")
+
+
+def failures(task: Task, reason: str) -> list[Entry]:
+    """Entries that say that nothing of a job could be done."""
+    return [_entry(task.job, want, "failed") | {"reason": reason} for want in task.job.wants]
+
+
+def _entry(job: Job, want: Want, status: str) -> Entry:
+    return {
+        "output": want.output,
+        "status": status,
+        "photo": job.photo,
+        "colorway": want.colorway.name,
+        "source": want.source,
+    }
+
+
+def _perform(task: Task) -> list[Entry]:
+    job = task.job
+    with contextlib.ExitStack() as stack:
+        places = {path: stack.enter_context(storage.local(path)) for path in job.inputs}
+        digests = {path: storage.digest(place) for path, place in places.items()}
+        inputs = hashlib.sha256("".join(digests.values()).encode()).hexdigest()
+        due = [want for want in job.wants if not _done(task, want.output, inputs, _settings(task, want))]
+        sheet_settings = hashlib.sha256("".join(_settings(task, want) for want in job.wants).encode()).hexdigest()
+        sheet_due = task.sheets and not _done(task, job.sheet, inputs, sheet_settings)
+        if not due and not sheet_due:
+            return [task.known[want.output] | {"status": "kept"} for want in job.wants]
+        try:
+            entries = _recolored(task, due, sheet_due, places, digests)
+        except DyehouseError as error:  # files that were fetched are called as they were asked for
+            said = str(error)
+            for path, place in places.items():
+                said = said.replace(f"'{place}'", f"'{path}'")
+            return failures(task, said)
+    for entry in entries:
+        entry["input"] = inputs
+        if entry["status"] == "sheet":
+            entry["settings"] = sheet_settings
+    return entries
+
+
+def _settings(task: Task, want: Want) -> str:
+    gate = "" if task.max_error is None else f"{task.max_error!r} {task.allow_warnings}"
+    return hashlib.sha256((task.job.settings(want) + gate).encode()).hexdigest()
+
+
+def _done(task: Task, output: str, inputs: str, settings: str) -> bool:
+    """Whether an earlier run made this file, from the same, and it is still as it was made."""
+    entry = task.known.get(output)
+    if entry is None or entry.get("input") != inputs or entry.get("settings") != settings or not entry.get("sha256"):
+        return False
+    return storage.digest_at(storage.join(task.out, entry["file"])) == entry["sha256"]
+
+
+def _recolored(
+    task: Task, due: list[Want], sheet_due: bool, places: dict[str, Path], digests: dict[str, str]
+) -> list[Entry]:
+    job = task.job
+    started = time.perf_counter()
+    opened = files.read(places[job.photo], job.color_space)
+    recipe = job.recipe
+    if recipe.camera in places:
+        recipe = replace(recipe, camera=str(places[recipe.camera]))
+    recipe = replace(recipe, colorways=tuple(want.colorway for want in job.wants))
+    prepared = photo.look(opened, recipe, read_mask=lambda name: _mask(places[name], digests[name], opened))
+    proxy = proxy_of(prepared, CELL) if sheet_due else None
+    cells = []
+    if proxy is not None:
+        same = Colorway("", (None,) * len(recipe.regions))
+        unlit = replace(prepared, target_white=prepared.white)
+        cells.append(("photo", thumbnail(proxy, unlit.for_colorway(same))))
+    entries = []
+    out: NDArray | None = None
+    for want in job.wants:
+        own = prepared.for_colorway(want.colorway)
+        if proxy is not None:
+            cells.append((want.colorway.name, thumbnail(proxy, own)))
+        if want not in due:
+            entries.append(task.known[want.output] | {"status": "kept"})
+            continue
+        dtype = files.output_dtype(want.output, opened)
+        if out is None or out.dtype != dtype:
+            out = np.empty(opened.pixels.shape, dtype)
+        try:
+            entry = _written(task, want, opened, own, out)
+        except DyehouseError as error:
+            entry = _entry(job, want, "failed") | {"reason": str(error)}
+        entries.append(entry | {"seconds": round(time.perf_counter() - started, 3)})
+        started = time.perf_counter()
+    if cells:
+        entries.append(_sheet(task, cells))
+    return entries
+
+
+def _mask(place: Path, digest: str, opened: files.Photo) -> NDArray:
+    shape = (opened.pixels.shape[0], opened.pixels.shape[1])
+    key = (digest or str(place), shape)
+    if key not in _masks:
+        mask = files.read_mask(place, shape)
+        _masks[key] = mask
+        while len(_masks) > _MASKS:
+            _masks.popitem(last=False)
+        return mask
+    _masks.move_to_end(key)
+    return _masks[key]
+
+
+def _written(task: Task, want: Want, opened: files.Photo, own: Prepared, out: NDArray) -> Entry:
+    """Write one result and tell of it."""
+    error = predicted_error(own)
+    reason = _gate(task, own, error)
+    file = f"{ASIDE}/{want.output}" if reason else want.output
+    place = _place(task.out, file)
+    with storage.arriving(place) as local:
+        written, shares = photo.save(
+            opened,
+            own,
+            local,
+            force=True,
+            quality=want.quality,
+            compression=want.compression,
+            out=out,
+            threads=task.threads,
+        )
+        digest = storage.digest(written)
+    _remove_other(task, want, file)
+    entry = _entry(task.job, want, "needs a person" if reason else "done")
+    return entry | {
+        "file": file,
+        "settings": _settings(task, want),
+        "sha256": digest,
+        "model": [analysis.model for analysis in own.analyses],
+        "predicted_error": error,
+        "warnings": inspection.with_shares({"warnings": own.warnings}, shares)["warnings"],
+        "notes": list(opened.assumptions),
+        "reason": reason,
+    }
+
+
+def predicted_error(own: Prepared) -> dict[str, float]:
+    """Median and 95th percentile of the predicted error over the worst region that is recolored, CIEDE2000."""
+    worst = {"median": 0.0, "p95": 0.0}
+    for k, analysis in enumerate(own.analyses):
+        if own.recipe.regions[k].target is None and np.array_equal(own.white, own.target_white):
+            continue
+        target, white = own.target(k), own.target_white
+        carried = dichromatic.carried_residual(analysis.reference, target, analysis.white, white)
+        sample = Picture(analysis.picture.sample(_SAMPLE, analysis.mask)[None])
+        dropped, kept = (analysis.matrix(target, white, share)[:, :3] for share in ("drop", 1 - carried))
+        errors = stability.predicted_error(sample, dropped, kept, analysis.noise, white)
+        figures = {"median": float(np.quantile(errors, 0.5)), "p95": float(np.quantile(errors, 0.95))}
+        worst = max(worst, figures, key=lambda f: f["p95"])
+    return {name: round(value, 4) for name, value in worst.items()}
+
+
+def _gate(task: Task, own: Prepared, error: dict[str, float]) -> str:
+    """Why a result needs a person; empty if it does not."""
+    if task.max_error is None:
+        return ""
+    if not error["p95"] <= task.max_error:
+        return f"the predicted error is {error['p95']:.1f} CIEDE2000, more than {task.max_error:g}"
+    return own.warnings[0] if own.warnings and not task.allow_warnings else ""
+
+
+def _place(out: str, file: str) -> str:
+    """Path or URL of a file in the output folder; its folder is made, and must not lead elsewhere by a link."""
+    place = storage.join(out, file)
+    if not storage.is_url(place):
+        folder, root = Path(place).parent, Path(out)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            inside = folder.resolve().is_relative_to(root.resolve())
+        except (OSError, RuntimeError) as error:
+            raise FileError(f"The folder '{folder}' cannot be made ({error}): check the output folder.") from None
+        if not inside:
+            raise FileError(f"'{place}' leads out of the output folder by a link: remove the link.")
+    return place
+
+
+def _remove_other(task: Task, want: Want, file: str) -> None:
+    """Remove what an earlier run made of the same result in the other place."""
+    before = task.known.get(want.output, {}).get("file", file)
+    if before != file and not storage.is_url(task.out):
+        Path(storage.join(task.out, before)).unlink(missing_ok=True)
+
+
+def _sheet(task: Task, cells: list[tuple[str, NDArray[np.uint8]]]) -> Entry:
+    """Write the contact sheet of a photo."""
+    entry = {"output": task.job.sheet, "status": "sheet", "photo": task.job.photo, "file": task.job.sheet}
+    picture = sheet.contact_sheet([cells[k : k + ACROSS] for k in range(0, len(cells), ACROSS)], CELL)
+    try:
+        with storage.arriving(_place(task.out, task.job.sheet)) as local:
+            files.write(local, picture, files.Photo(Path(), picture, files.SRGB), force=True, quality=88)
+            digest = storage.digest(local)
+    except DyehouseError as error:
+        return entry | {"status": "sheet failed", "reason": str(error)}
+    height, width = picture.shape[:2]
+    return entry | {
+        "sha256": digest,
+        "size": [width, height],
+        "cell": [CELL, cells[0][1].shape[0] * CELL // cells[0][1].shape[1]],
+        "cells": [want.output for want in task.job.wants],
+    }

@@ -1,0 +1,90 @@
+"""Light that met the product more than once: deep folds, the inside of a cup.
+
+A surface of reflectance ``rho`` that lights itself sends out, besides ``rho`` times the light of the lamps, ``rho**2``
+times what it got from its neighbor, ``rho**3`` and so on. With a constant share K of every reflection coming back,
+the part beyond the first is in proportion to
+
+    rho**2 / (1 - K rho)
+
+in every channel (Koenderink & van Doorn 1983; Nayar, Ikeuchi & Kanade 1991). It is more saturated than the body, so
+that the dichromatic model takes it for gloss below zero. Channels are treated as narrow bands, in which the
+reflectance is constant; on the spectral renders of the laboratory that is near enough, see docs/models.md.
+
+References
+----------
+J. J. Koenderink and A. J. van Doorn, "Geometrical modes as a general method to treat diffuse interreflections in
+radiometry", J. Opt. Soc. Am. 73, 843-850 (1983).
+S. K. Nayar, K. Ikeuchi and T. Kanade, "Shape from interreflections", Int. J. Comput. Vision 6, 173-195 (1991).
+B. V. Funt and M. S. Drew, "Color space analysis of mutual illumination", IEEE Trans. Pattern Anal. Mach. Intell. 15,
+1319-1326 (1993).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+# Share K of the light that comes back, over the exposure of the reference: what the folds of the laboratory have, and
+# where the search for it starts.
+USUAL = 0.55
+
+# K rho is held below this: beyond, the sum of all bounces is a guess.
+_MOST = 0.9
+
+# Pixels that count as independent of each other: what the model misses, it misses in all of a fold.
+_INDEPENDENT = 1000
+
+_CANDIDATES = USUAL * 2.0 ** np.linspace(-2.5, 2.5, 21)
+
+
+def bounced(body: ArrayLike, feedback: float) -> NDArray[np.float64]:
+    """Color of the light that met the surface at least twice, ``rho**2 / (1 - K rho)``.
+
+    Parameters
+    ----------
+    body
+        (3,) body color relative to the white. Channels below zero count as zero.
+    feedback
+        K, >= 0.
+
+    Returns
+    -------
+    (3,) float64, relative to the white.
+    """
+    rho = np.maximum(np.asarray(body, np.float64), 0.0)
+    return rho**2 / (1 - np.minimum(feedback * rho, _MOST))
+
+
+def find_feedback(pixels: NDArray, body: NDArray, noise: NDArray) -> float:
+    """Find K of a matte product from the colors of its folds.
+
+    With the right K all pixels lie in the plane of the body color and its bounce. An exposure that is unknown, so that
+    the body color is the reflectance times a factor, is found along with it.
+
+    Parameters
+    ----------
+    pixels
+        (n, 3) relative to the white and, each, to its brightness along the body color.
+    body
+        (3,) relative to the white.
+    noise
+        (n,) standard deviation of the pixels.
+
+    Returns
+    -------
+    K; `USUAL` where the pixels do not tell.
+    """
+    best, least = USUAL, np.inf
+    for k in _CANDIDATES:
+        if k * body.max() > _MOST:
+            break
+        normal = np.cross(body, bounced(body, k))
+        length = float(np.linalg.norm(normal))
+        if length < 1e-9:
+            return USUAL
+        # Errors beyond three deviations are something else than folds.
+        left = _INDEPENDENT * np.minimum((pixels @ (normal / length) / noise) ** 2, 9.0).mean()
+        cost = float(left + np.log2(k / USUAL) ** 2)
+        if cost < least:
+            best, least = float(k), cost
+    return best

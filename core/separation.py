@@ -1,0 +1,147 @@
+"""Body, gloss and bounce told apart pixel by pixel, as well as the noise allows.
+
+Beside its light along the body color, a pixel has two numbers: its color across it. Gloss moves them toward the white,
+bounced light away from it. Where the photo is noisy, or the product almost grey, single pixels do not tell; what is
+done about it, in this order:
+
+1. The color across is smoothed under the guidance of the light along, which carries shading and texture at little
+   noise (He, Sun & Tang 2013, on a coarse grid as in He & Sun 2015). What leaves the smooth by more than noise does
+   is kept (Lee 1980).
+2. B and C are the most probable ones: Gaussian noise, and a prior that allows any gloss above zero, hardly any
+   below, and a bounce of the size that folds have. Each weighs by the noise of the pixel, so that what is poorly
+   determined shrinks to none, and nothing changes where the noise is small.
+
+The light along the body color is never touched: shading and texture stay as they are.
+
+References
+----------
+K. He, J. Sun and X. Tang, "Guided image filtering", IEEE Trans. Pattern Anal. Mach. Intell. 35, 1397-1409 (2013).
+K. He and J. Sun, "Fast guided filter", arXiv:1505.00996 (2015).
+J.-S. Lee, "Digital image enhancement and noise filtering by use of local statistics", IEEE Trans. Pattern Anal. Mach.
+Intell. 2, 165-168 (1980).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .interreflection import bounced
+
+# What the model itself is wrong by, as a share of a pixel's light: it counts as noise.
+MODEL_ERROR = 0.003
+
+# Widths of the priors: gloss above and below zero, as shares of the light; bounce above and below zero, in units of
+# the body's light.
+_GLOSS, NO_GLOSS = 1.0, 0.02
+USUAL_BOUNCE, _NO_BOUNCE = 0.3, 0.05
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Axes of color for one body color, all relative to the white.
+
+    Attributes
+    ----------
+    along
+        (3,) unit vector of the body color.
+    across
+        (2, 3) unit vectors at right angles to it; the first toward white.
+    length
+        Of the body color.
+    white, bounce
+        (3,) the white and the bounce along these three axes.
+    """
+
+    along: NDArray[np.float64]
+    across: NDArray[np.float64]
+    length: float
+    white: NDArray[np.float64]
+    bounce: NDArray[np.float64]
+
+
+def frame(body: NDArray, feedback: float = 0.0) -> Frame:
+    """Axes for a body color (3,), relative to the white."""
+    length = float(np.linalg.norm(body))
+    along = body / length
+    toward = 1 - along.sum() * along
+    size = float(np.linalg.norm(toward))
+    if size < 1e-6:  # grey: any direction across will do, there is no gloss to be seen in it
+        toward = np.cross(along, [1.0, -1.0, 0.0])
+        size = float(np.linalg.norm(toward))
+    first = toward / size
+    axes = np.stack([along, first, np.cross(along, first)])
+    return Frame(along, axes[1:], length, axes @ np.ones(3), axes @ bounced(body, feedback))
+
+
+def split(
+    light: NDArray,
+    across: NDArray,
+    variance: NDArray,
+    axes: Frame,
+    bounce: bool,
+    gloss: bool = True,
+    below: float = NO_GLOSS,
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Most probable gloss and bounce of pixels.
+
+    The sum of squares is convex, with a kink in its slope where B or C is zero: of the four quadratics the one whose
+    solution lies on its own side is the solution, and it moves continuously with the pixel.
+
+    Parameters
+    ----------
+    light
+        (...) along the body color, above zero.
+    across
+        (2, ...) color across it.
+    variance
+        (...) of the noise in it.
+    axes
+        The frame.
+    bounce, gloss
+        Whether there is any of each.
+    below
+        Width of the prior of gloss below zero, as a share of the light.
+
+    Returns
+    -------
+    B, C
+        (...) gloss and bounce.
+    left
+        (...) square of what is left over, in units of the variance.
+    """
+    total = variance + (MODEL_ERROR * light) ** 2
+    (e1, e2), (f1, f2) = axes.white[1:], axes.bounce[1:]
+    y1, y2 = across
+    b, c = np.zeros_like(light), np.zeros_like(light)
+    shine, folded = total / light**2, total / (light / axes.length) ** 2
+    for wide_b in (True, False) if gloss else (True,):
+        for wide_c in (True, False) if bounce else (True,):
+            r1, r2 = e1 * y1 + e2 * y2, f1 * y1 + f2 * y2
+            a11 = e1 * e1 + e2 * e2 + shine / (_GLOSS if wide_b else below) ** 2
+            a22 = f1 * f1 + f2 * f2 + folded / (USUAL_BOUNCE if wide_c else _NO_BOUNCE) ** 2
+            a12 = e1 * f1 + e2 * f2
+            if not bounce:
+                b_here, c_here = r1 / a11, 0.0
+            elif not gloss:
+                b_here, c_here = 0.0, r2 / a22
+            else:
+                scale = 1 / (a11 * a22 - a12 * a12)
+                b_here, c_here = (a22 * r1 - a12 * r2) * scale, (a11 * r2 - a12 * r1) * scale
+            own = np.ones(light.shape, bool)
+            if gloss:
+                own &= (b_here >= 0) == wide_b
+            if bounce:
+                own &= (c_here >= 0) == wide_c
+            if gloss:
+                np.copyto(b, b_here, where=own)
+            if bounce:
+                np.copyto(c, c_here, where=own)
+    left = ((y1 - e1 * b - f1 * c) ** 2 + (y2 - e2 * b - f2 * c) ** 2) / total
+    if gloss:  # what single pixels do not prove is none
+        doubt = 4 * variance / np.maximum(axes.white[1] ** 2 * b * b, 1e-30)
+        b *= np.maximum(0.0, 1 - doubt)
+        np.minimum(b, light / axes.white[0], out=b)  # no more gloss than light
+    return b, c, left
