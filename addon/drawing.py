@@ -36,8 +36,8 @@ def box(left: float, bottom: float, width: float, height: float, color: Sequence
 
     right, top = left + width, bottom + height
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
-    batch = batch_for_shader(shader, "TRI_FAN", {"pos": corners})
+    corners = [(left, bottom), (right, bottom), (left, top), (right, top)]
+    batch = batch_for_shader(shader, "TRI_STRIP", {"pos": corners})
     gpu.state.blend_set("ALPHA")
     shader.uniform_float("color", color)
     batch.draw(shader)

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, lru_cache, partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,7 +41,11 @@ SPACE_NAMES = {
 @cache
 def reads_files() -> bool:
     """Whether OpenImageIO is there; without it Blender itself reads and writes."""
-    return find_spec("OpenImageIO") is not None
+    try:
+        import OpenImageIO  # noqa: F401
+    except ImportError:
+        return False
+    return True
 
 
 def working_space() -> "RGBSpace":
@@ -135,6 +138,8 @@ def version_of(image: bpy.types.Image, hurry: bool = False) -> tuple[object, ...
     hurry
         While a window is drawn: pixels that are in no file may be looked at only now and then.
     """
+    if image.type == "RENDER_RESULT":
+        return image.session_uid, image.render_slots.active_index, _renders
     path = file_of(image)
     base = (image.session_uid, tuple(image.size), image.colorspace_settings.name, color_space_name(image))
     if path is not None:
@@ -143,6 +148,16 @@ def version_of(image: bpy.types.Image, hurry: bool = False) -> tuple[object, ...
     if image.packed_file and not image.is_dirty:
         return (*base, "packed", image.packed_file.size)
     return (*base, "pixels", _fingerprint(image, hurry))
+
+
+# Renders of this session: of a render, Blender shows no pixels to compare.
+_renders = 0
+
+
+def count_render() -> None:
+    """Know that there is a new render."""
+    global _renders
+    _renders += 1
 
 
 # Of each image in memory: when it may be looked at again, and what was found.
@@ -406,7 +421,7 @@ def new_image(name: str, pixels: "NDArray", space: "RGBSpace", premultiplied: bo
     name
         Of the new image.
     pixels
-        (height, width, 3 or 4): uint8 codes give a byte image, anything else a float one.
+        (height, width, 3 or 4): uint8 codes of a space that Blender knows give a byte image, all else a float one.
     space
         What the pixels mean. Floats are brought into the working space.
     premultiplied
@@ -415,14 +430,15 @@ def new_image(name: str, pixels: "NDArray", space: "RGBSpace", premultiplied: bo
     import numpy as np
 
     from ..core import colorimetry, transfer
+    from ..core.colorspace import SPACES
 
     height, width, channels = pixels.shape
-    byte = pixels.dtype == np.uint8
+    named = [blenders for blenders, ours in SPACE_NAMES.items() if SPACES[ours] is space]
+    byte = pixels.dtype == np.uint8 and bool(named)
     image = bpy.data.images.new(name, width, height, alpha=channels == 4, float_buffer=not byte)
     rgba = np.ones((height, width, 4), np.float32)
     if byte:
-        told = {ours: blenders for blenders, ours in reversed(SPACE_NAMES.items())}
-        image.colorspace_settings.name = next((told[k] for k in told if _is_space(k, space)), "sRGB")
+        image.colorspace_settings.name = named[0]
         rgba[..., :channels] = pixels / np.float32(255)
     else:
         linear = transfer.decode(pixels[..., :3], space.curve) if not space.curve.is_linear else pixels[..., :3]
@@ -438,9 +454,3 @@ def new_image(name: str, pixels: "NDArray", space: "RGBSpace", premultiplied: bo
                 rgba[..., :3] *= rgba[..., 3:]
     set_pixels(image, rgba)
     return image
-
-
-def _is_space(name: str, space: "RGBSpace") -> bool:
-    from ..core.colorspace import SPACES
-
-    return SPACES[name] is space

@@ -130,7 +130,7 @@ def _version(path: Path) -> tuple[object, ...]:
 
 
 def of_spline(mask: bpy.types.Mask) -> Source:
-    """A mask of Blender's mask editor, as it is in the current frame, without feather."""
+    """A mask of Blender's mask editor, as it is in the current frame, without feather and unfilled splines."""
     layers = [_layer(layer) for layer in mask.layers if not layer.hide_render]
 
     def load(shape: tuple[int, int]) -> "Callable[[], NDArray]":

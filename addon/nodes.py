@@ -129,7 +129,7 @@ def fill(
 ) -> None:
     """Set a recolor node's inputs; all colors (3,) linear RGB in the picture's space."""
     inputs = node.inputs
-    colors = {"Reference": mixture.body, "White": mixture.white, "Target White": target_white}
+    colors: dict[str, Any] = {"Reference": mixture.body, "White": mixture.white, "Target White": target_white}
     colors["Second Light"] = mixture.light
     by_channel = mixture.terms == ("red", "green", "blue")
     for term, name in _WEIGHTS.items():
@@ -139,7 +139,8 @@ def fill(
     for name, value in colors.items():
         inputs[name].default_value = tuple(float(v) for v in value)
     inputs["Feedback"].default_value = mixture.feedback
-    inputs["Residual"].default_value = {"fade": 1.0, "keep": 1.0, "drop": 0.0}.get(residual, residual)
+    shares = {"fade": 1.0, "keep": 1.0, "drop": 0.0}
+    inputs["Residual"].default_value = shares[residual] if isinstance(residual, str) else residual
     inputs["Fade Residual"].default_value = residual == "fade"
     set_target(node, target)
 

@@ -127,8 +127,9 @@ def _found(kind: str, now: preview.Shown, index: int) -> Map:
 
 
 def _error(now: preview.Shown, index: int, target: "NDArray[np.float64]") -> Map:
-    analysis = now.look.prepared.analyses[index].thinned(now.whole.step)
-    return _colored("ERROR", analysis.predicted_error(target, now.look.prepared.target_white), now, index)
+    prepared, step = now.look.prepared, now.whole.step
+    values = prepared.analyses[index].predicted_error(target, prepared.target_white)
+    return _colored("ERROR", values[::step, ::step], now, index)
 
 
 def _colored(kind: str, values: "NDArray", now: preview.Shown, index: int) -> Map:
@@ -146,11 +147,11 @@ def _gamut(now: preview.Shown, regions: "list[RegionMatrix]") -> Map:
 
     from ..core.gamut import out_of_gamut
 
-    share = sum(now.whole.data[first, ..., 3] for first in now.whole.firsts)
-    outside = out_of_gamut(now.whole.recolored(regions)) & (share > 0)
+    product = (now.whole.data[list(now.whole.firsts), ..., 3] > 0).any(axis=0)
+    outside = out_of_gamut(now.whole.recolored(regions)) & product
     colors = np.zeros((*outside.shape, 4), np.float32)
     colors[outside] = (*_OUT_OF_GAMUT, 1)
-    part = np.count_nonzero(outside) / max(1, np.count_nonzero(share))
+    part = np.count_nonzero(outside) / max(1, np.count_nonzero(product))
     return Map(colors, f"{part:.1%} of the product outside {now.look.photo.space.name}")
 
 
@@ -222,8 +223,8 @@ def _draw_map(texture: gpu.types.GPUTexture, layers: "Layers", opacity: float) -
     u = (right - left) / (layers.step * texture.width)
     v = (bottom - top) / (layers.step * texture.height)
     shader = gpu.shader.from_builtin("IMAGE_COLOR")
-    corners, coordinates = [(0, 0), (1, 0), (1, 1), (0, 1)], [(0, v), (u, v), (u, 0), (0, 0)]
-    batch = batch_for_shader(shader, "TRI_FAN", {"pos": corners, "texCoord": coordinates})
+    corners, coordinates = [(0, 0), (1, 0), (0, 1), (1, 1)], [(0, v), (u, v), (0, 0), (u, 0)]
+    batch = batch_for_shader(shader, "TRI_STRIP", {"pos": corners, "texCoord": coordinates})
     gpu.state.blend_set("ALPHA")
     shader.bind()
     shader.uniform_sampler("image", texture)

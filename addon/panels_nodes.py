@@ -5,7 +5,7 @@ import bpy
 from . import nodes
 from .operators import texture as texture_operators
 
-_SETTINGS = ("Reference", "White", "Target White", "Surface Reflection", "Residual", "Fade Residual")
+_SETTINGS = ("Target White", "Residual", "Fade Residual")
 
 
 class _Split:
@@ -126,11 +126,11 @@ def _texture_operator(
 
 
 def _settings(layout: bpy.types.UILayout, node: bpy.types.Node) -> None:
-    """Inputs of a recolor node: the target first, what was found in the picture in a part that opens."""
+    """Inputs of a recolor node that are for the user; the others were found in the picture."""
     _input(layout, node, "Target Color")
     _input(layout, node, "Mask")
-    header, body = layout.panel("dyehouse_photo", default_closed=True)
-    header.label(text="Photo")
+    header, body = layout.panel("dyehouse_light", default_closed=True)
+    header.label(text="New Light")
     if body:
         for name in _SETTINGS:
             _input(body, node, name)

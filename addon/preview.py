@@ -48,7 +48,9 @@ void main() {
 _FRAGMENT = """
 vec4 layer(int k) {
     if (nearest) {
-        return texelFetch(layers, ivec3(ivec2(uv * vec2(textureSize(layers, 0).xy)), k), 0);
+        // The editor looks up its own pixels at the lower left corner of those of the screen (measured).
+        vec2 corner = max(uv - 0.5 * (dFdx(uv) + dFdy(uv)), 0.0);
+        return texelFetch(layers, ivec3(ivec2(corner * vec2(textureSize(layers, 0).xy)), k), 0);
     }
     return texture(layers, vec3(uv, float(k)));
 }
@@ -249,10 +251,10 @@ def paint(
     v = (bottom - top) / (layers.step * layers.data.shape[1])
     batch = batch_for_shader(
         shader,
-        "TRI_FAN",
+        "TRI_STRIP",
         {
-            "pos": [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])],
-            "coordinate": [(0, v), (u, v), (u, 0), (0, 0)],
+            "pos": [(x[0], y[0]), (x[1], y[0]), (x[0], y[1]), (x[1], y[1])],
+            "coordinate": [(0, v), (u, v), (0, 0), (u, 0)],
         },
     )
     to_working = np.zeros((1, 3, 4), np.float32)

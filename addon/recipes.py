@@ -84,18 +84,27 @@ def recipe_of(image: bpy.types.Image) -> "Recipe":
     DyehouseError
         If a setting cannot be understood; the sentence says which and why.
     """
+    asked: DyehousePhoto = image.dyehouse
+    return replace(
+        without_regions(image),
+        regions=tuple(_region(region, index) for index, region in enumerate(asked.regions)),
+        colorways=tuple(colorway_of(colorway, image) for colorway in asked.colorways),
+    )
+
+
+def without_regions(image: bpy.types.Image) -> "Recipe":
+    """The part of the recipe that is about the whole photo: its light and the new one; errors as of `recipe_of`."""
     from ..core.recipe import Recipe
 
     asked: DyehousePhoto = image.dyehouse
     return Recipe(
-        regions=tuple(_region(region, index) for index, region in enumerate(asked.regions)),
+        regions=(),
         white=_white(asked),
         gray=decimal(asked.gray) if asked.white_source == "PIXEL" else 1.0,
         illuminant=_light(asked),
         observer=asked.observer,
         camera=bpy.path.abspath(asked.camera, library=image.library) or None,
         adaptation=asked.adaptation,
-        colorways=tuple(colorway_of(colorway, image) for colorway in asked.colorways),
     )
 
 

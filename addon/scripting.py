@@ -145,14 +145,14 @@ def look_at(image: bpy.types.Image, **asked: Any) -> session.Look:
 
 def recipe_of(image: bpy.types.Image, **asked: Any) -> "tuple[Recipe, dict[str, masks.Source]]":
     """The recipe of arguments, and its masks by the names that they have in it; parameters as for :func:`recolor`."""
-    from ..batch.cli import parser, recipe_from
+    from ..batch.cli import REGION_KEYS, parser, recipe_from
     from ..core.errors import RecipeError
     from ..core.recipe import with_target
 
     usual = vars(parser().parse_args(["inspect", "photo"]))
     unknown = asked.keys() - usual.keys() - {"regions"}
     if unknown:
-        raise RecipeError(f"'{min(unknown)}' is not understood: use {', '.join(sorted(_REGION))} or a light's option.")
+        raise RecipeError(f"'{min(unknown)}' is not understood: use {', '.join(REGION_KEYS)} or a light's option.")
     regions = [_region_of(image, region) for region in asked.pop("regions", ()) or ()]
     common_part, sources, swatch = _region_of(image, asked)
     given = {key: value for key, value in common_part.items() if value not in (None, "")}
@@ -167,9 +167,6 @@ def recipe_of(image: bpy.types.Image, **asked: Any) -> "tuple[Recipe, dict[str, 
     if regions or swatch:
         recipe = with_target(recipe, *(swatches or [swatch]))
     return recipe, sources
-
-
-_REGION = ("target", "reference", "click", "mask", "tolerance", "model", "residual", "meaning", "source")
 
 
 def _image(image: Image) -> bpy.types.Image:

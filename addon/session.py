@@ -74,8 +74,10 @@ def begin(image: bpy.types.Image, recipe: "Recipe") -> Callable[[], Look]:
     sources = masks.sources(image)
     key = _key(image, recipe, sources)
     found = _looks.found(key)
-    make = _begin(image, recipe, sources, key) if found is None else None
-    return lambda: _asking(found or _looks.now(key, lambda: make), recipe)
+    if found is not None:
+        return partial(_asking, found, recipe)
+    make = _begin(image, recipe, sources, key)
+    return lambda: _asking(_looks.now(key, lambda: make), recipe)
 
 
 def ready(image: bpy.types.Image) -> Look | None:
@@ -180,12 +182,22 @@ def _on_load(_path: str) -> None:
     forget()
 
 
+@persistent
+def _on_render(*_: object) -> None:
+    images.count_render()
+
+
+_HANDLERS = (("load_post", _on_load), ("render_complete", _on_render), ("render_cancel", _on_render))
+
+
 def register() -> None:
-    """Forget with each .blend that is opened."""
-    bpy.app.handlers.load_post.append(_on_load)
+    """Forget with each .blend that is opened, and know of each render."""
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
 
 
 def unregister() -> None:
     """Forget all."""
-    bpy.app.handlers.load_post.remove(_on_load)
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).remove(handler)
     forget()

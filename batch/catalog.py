@@ -103,8 +103,7 @@ class Run:
             raise FileError(f"A journal cannot be kept at '{out}': give one of this machine with --journal FILE.")
         self.journal = Journal(Path(settings.journal or Path(out) / JOURNAL))
         try:
-            if not storage.is_url(out):
-                _remove_unfinished(Path(out))
+            self._clean()
             if self.journal.entries and not (settings.resume or settings.force):
                 raise FileError(f"'{out}' holds an earlier run: give --resume to go on, or --force to make all anew.")
             self.journal.share()
@@ -120,10 +119,15 @@ class Run:
                 with contextlib.closing(results):
                     for entries in results:
                         yield from self._noted(entries)
-            if self.settings.sheets:
+            if self.settings.sheets and not self.stopped:
                 self._write_page()
         finally:
+            self._clean()  # a worker that dies leaves what it was writing
             self.journal.close()
+
+    def _clean(self) -> None:
+        if not storage.is_url(self.settings.out):
+            _remove_unfinished(Path(self.settings.out))
 
     def _noted(self, entries: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
         self.journal.add(entry for entry in entries if entry["status"] != "kept")
@@ -188,7 +192,9 @@ class Run:
                 beside.write_text(text, encoding="utf-8")
                 beside.replace(place)
             except OSError as error:
-                raise FileError(f"The page '{place}' cannot be written ({error.strerror}): make room.") from None
+                raise FileError(
+                    f"The page '{place}' cannot be written ({error.strerror}): make room, then go on with --resume."
+                ) from None
             finally:
                 beside.unlink(missing_ok=True)
 
@@ -228,7 +234,7 @@ def _writable_folder(folder: Path) -> None:
 
 
 def _remove_unfinished(folder: Path) -> None:
-    """Remove what workers were writing when an earlier run was killed."""
+    """Remove what workers were writing when they were killed."""
     for place, _, names in os.walk(folder):
         for name in names:
             if name.startswith(".dyehouse-"):

@@ -139,7 +139,7 @@ def _add_swatches(commands: Any) -> None:
     command.add_argument("--count", type=int, metavar="N", help="at most so many (of the nearest: 10)")
     command.add_argument("--under", metavar="LIGHTS", help="how spectra look under these lights, as D65,A,FL11")
     command.add_argument("--against", metavar="SWATCH", help="metamerism index of spectra against this spectrum")
-    command.add_argument("--plain-cmyk", action="store_true", help="read CMYK without a profile, roughly")
+    command.add_argument("--cmyk", metavar="PROFILE", help="ICC profile of the inks; or 'plain', roughly without one")
     command.add_argument("-o", "--output", metavar="FILE", help="write them as .ase, .aco, .gpl, .cxf, .csv or .txt")
     command.add_argument("--force", action="store_true", help="overwrite an existing file")
     command.add_argument("--json", action="store_true", help="print one JSON object, for machines")
@@ -157,13 +157,15 @@ def _add_recipe(command: argparse.ArgumentParser) -> None:
     product.add_argument("--click", metavar="X,Y", help="select the product under this pixel, and find its color")
     product.add_argument("--mask", metavar="FILE", help="mask file, 'alpha', or 'click' (at the reference)")
     product.add_argument("--tolerance", type=float, default=1.0, help="of a clicked region (default 1)")
-    product.add_argument("--model", default="auto", help="auto (default), dichromatic or body")
+    product.add_argument(
+        "--model", default="auto", help="auto (default), body, dichromatic, regularized, bounce, lights or metal"
+    )
     product.add_argument(
         "--region",
         action="append",
         metavar="'KEY=VALUE ...'",
         help="one of several regions, with "
-        "the keys target, reference, click, mask, tolerance, model, residual, meaning, source",
+        "the keys target, reference, click, mask, tolerance, model, residual, meaning, source, spill",
     )
     color = command.add_argument_group("the color")
     color.add_argument("--target", metavar="SWATCH", help="the color it shall have")
@@ -171,10 +173,16 @@ def _add_recipe(command: argparse.ArgumentParser) -> None:
         "--meaning",
         choices=("reference", "product"),
         default="reference",
-        help="'reference': the reference pixel shall read the target (default). 'product': the product shall have "
-        "the target's reflectance, in the light that falls on the reference",
+        help="'reference': a matte pixel in the light of the reference shall read the target (default). 'product': "
+        "the product shall have the target's reflectance, in the light that falls on the reference",
     )
     color.add_argument("--source", metavar="SWATCH", help="the product's present color, for --meaning product")
+    color.add_argument(
+        "--spill",
+        action="store_true",
+        help="recolor what shows of the product outside the mask too: the rim that a mask too tight leaves, and the "
+        "light thrown on a neutral surround",
+    )
     color.add_argument("--residual", default="fade", help="what the model does not explain: fade (default), keep, drop")
     light = command.add_argument_group("the light")
     light.add_argument(
@@ -235,7 +243,7 @@ def _light(text: str | None) -> str | tuple[float, ...] | None:
     return _numbers(text, "White", (2, 3))
 
 
-_KEYS = ("target", "reference", "click", "mask", "tolerance", "model", "residual", "meaning", "source")
+REGION_KEYS = ("target", "reference", "click", "mask", "tolerance", "model", "residual", "meaning", "source", "spill")
 
 
 def recipe_from(options: argparse.Namespace) -> Recipe:
@@ -249,7 +257,7 @@ def recipe_from(options: argparse.Namespace) -> Recipe:
     from ..core.errors import RecipeError
     from ..core.recipe import Recipe
 
-    common = {key: getattr(options, key) for key in _KEYS}
+    common = {key: getattr(options, key) for key in REGION_KEYS}
     if options.region:
         regions = []
         for text in options.region:
@@ -290,8 +298,8 @@ def region_options(text: str) -> dict[str, str]:
         raise RecipeError(f"Region '{text}' is not understood ({error}): close the quotes.") from None
     for word in words:
         key, equals, value = word.partition("=")
-        if not equals or key not in _KEYS:
-            raise RecipeError(f"Region '{text}' has '{word}': give KEY=VALUE with a key of {', '.join(_KEYS)}.")
+        if not equals or key not in REGION_KEYS:
+            raise RecipeError(f"Region '{text}' has '{word}': give KEY=VALUE with a key of {', '.join(REGION_KEYS)}.")
         found[key] = value
     return found
 
@@ -305,6 +313,8 @@ def _region(given: dict):
         tolerance = float(given["tolerance"])
     except ValueError:
         raise RecipeError(f"Tolerance '{given['tolerance']}' is not a number: 1 is ordinary.") from None
+    if given["spill"] not in (True, False, "yes", "no"):
+        raise RecipeError(f"Spill '{given['spill']}' is not understood: write spill=yes or spill=no.")
     residual: str | float = given["residual"]
     if isinstance(residual, str):
         with contextlib.suppress(ValueError):  # a word is checked where it is used
@@ -320,6 +330,7 @@ def _region(given: dict):
         source=parse_target(given["source"]) if given["source"] else None,
         model=given["model"],
         residual=residual,
+        spill=given["spill"] in (True, "yes"),
     )
 
 
@@ -342,7 +353,7 @@ def _asked(options: argparse.Namespace) -> tuple[Recipe, str | None]:
             raise RecipeError(f"Colorway '{options.colorway}' is one of no recipe: give its file with --recipe.")
         return recipe_from(options), options.color_space
     plain = vars(parser().parse_args([options.command, "photo", *(["-o", "file"] if "output" in options else [])]))
-    for name in (*_KEYS, "region", "white", "gray", "illuminant", "observer", "camera", "adaptation"):
+    for name in (*REGION_KEYS, "region", "white", "gray", "illuminant", "observer", "camera", "adaptation"):
         if getattr(options, name) != plain[name]:
             raise RecipeError(f"--{name} and --recipe contradict each other: write it into the recipe file.")
     stored = read_recipe(options.recipe)
@@ -427,7 +438,7 @@ def _swatches(options: argparse.Namespace) -> int:
         figures = swatch_listing.libraries()
     else:
         library, away = swatch_listing.choose(
-            options.place, options.search, options.nearest, options.count, options.plain_cmyk
+            options.place, options.search, options.nearest, options.count, options.cmyk
         )
         lights = options.under.split(",") if options.under else ()
         figures = swatch_listing.report(library, away, lights, options.against)

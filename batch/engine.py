@@ -91,11 +91,13 @@ def run[Task, Result](
             if suspects:
                 suspects += waiting.values()
                 waiting.clear()
-                pool.shutdown(wait=False, cancel_futures=True)
+                pool.shutdown(wait=False)
                 yield from _one_by_one(suspects, work, executor, failed, stop)
                 pool = executor()
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        for future in waiting:
+            future.cancel()
+        pool.shutdown(wait=True)
 
 
 def _one_by_one[Task, Result](

@@ -13,7 +13,7 @@ from ..core.errors import FileError
 from ..core.recipe import Prepared
 from ..core.recolor import Shares
 from ..core.stability import matrix_gain
-from . import files
+from . import files, target_report
 
 # Mean residual of a plastic cup in the paper, on the scale of 0..255.
 PAPER_RESIDUAL = 0.27
@@ -46,6 +46,7 @@ def report(photo: files.Photo, prepared: Prepared) -> dict[str, Any]:
                 "recolor_noise_gain": noise,
                 "matrix": matrix.tolist(),
             }
+            | target_report.about(prepared, k)
         )
     height, width = photo.pixels.shape[:2]
     return {
@@ -87,7 +88,7 @@ def _gamut_warning(shares: Shares) -> list[str]:
         return []
     return [
         f"{shares.out_of_gamut:.1%} of the product falls outside the color space: an integer output keeps its hue and "
-        "gives up chroma; write EXR, or take a less saturated or darker target, to keep the color."
+        "gives up chroma; write EXR, a wider --output-space, or take a less saturated or darker target."
     ]
 
 
@@ -112,11 +113,15 @@ def in_words(figures: dict[str, Any], *, brief: bool = False) -> str:
             f"{region['change_ciede2000']:.1f} CIEDE2000 away"
         )
         if not brief:
+            lines += target_report.in_words(region)
             gain = region["noise_gain"]
             lines.append(
                 f"Model      {region['model']}, noise gain {'infinite' if gain is None else f'{gain:.1f}'} to split, "
                 f"{region['recolor_noise_gain']:.1f} to recolor"
             )
+            if region["evidence"]:
+                said = (f"{name.replace('_', ' ')} {value:.3g}" for name, value in region["evidence"].items())
+                lines.append(f"Evidence   {', '.join(said)}")
             lines.append(
                 f"Residual   mean {region['residual_mean']:.2f}, 95th percentile {region['residual_p95']:.2f} of 255 "
                 f"(the paper's plastic cup: {PAPER_RESIDUAL})"
@@ -139,7 +144,8 @@ def write_maps(prepared: Prepared, folder: Path, *, force: bool = False, prefix:
     """Write A, B, residual and predicted error of every region as pictures to look at.
 
     A is grey with 1 at half brightness, B likewise from black to 0.5 of the white, the residual is multiplied by 8 on
-    the scale of the picture, and the predicted error goes from 0 to 10 CIEDE2000.
+    the scale of the picture, and the predicted error goes from 0 to 10 CIEDE2000. Where the new picture leaves the
+    gamut a map of it is white there.
 
     Returns
     -------
@@ -162,6 +168,12 @@ def write_maps(prepared: Prepared, folder: Path, *, force: bool = False, prefix:
             maps["mask"] = analysis.mask / np.float32(
                 np.iinfo(analysis.mask.dtype).max if analysis.mask.dtype.kind == "u" else 1
             )
+        colors = analysis.recolor(
+            prepared.target(k), prepared.target_white, residual=prepared.recipe.regions[k].residual
+        )
+        outside = gamut.out_of_gamut(colors)
+        if outside.any():
+            maps["gamut"] = outside.astype(np.float32)
         for name, values in maps.items():
             written.append(files.write_map(folder / f"{prefix}{number}{name}.png", np.clip(values, 0, 1), force=force))
     return written

@@ -27,7 +27,7 @@ def worst_first(entries: Iterable[Entry]) -> list[Entry]:
     """Results in the order in which a person should look at them: failed, set aside, then by predicted error."""
 
     def key(entry: Entry) -> tuple[int, float, int, str]:
-        error = entry.get("predicted_error", {}).get("p95", 0.0)
+        error = entry.get("predicted_error", {}).get("bound90", 0.0)
         return _ORDER.get(entry["status"], 2), -error, -len(entry.get("warnings", ())), entry["output"]
 
     return sorted((entry for entry in entries if entry["status"] in _ORDER), key=key)
@@ -79,13 +79,15 @@ def _data(path: str) -> str:
 
 def _row(entry: Entry, sheet: Mapping[str, Any], index: int) -> str:
     error = entry.get("predicted_error", {})
-    figures = f"predicted ΔE00 {error['median']:.2f}, 95th percentile {error['p95']:.2f}" if error else ""
+    figures = (
+        f"predicted CIEDE2000 {error['median']:.2f}, 90 % of the pixels below {error['bound90']:.2f}" if error else ""
+    )
     said = [entry.get("reason", ""), *entry.get("warnings", ()), *entry.get("notes", ())]
     notes = "".join(f"<li>{html.escape(text)}</li>" for text in dict.fromkeys(said) if text)
     title = html.escape(f"{storage.name_of(entry['photo'])}, {entry['colorway']}")
     link = f'<a href="{html.escape(_quoted(entry["file"]))}">{title}</a>' if entry.get("file") else title
     return (
-        f'<article data-status="{entry["status"]}" data-error="{error.get("p95", "")}">{_slider(sheet, index)}'
+        f'<article data-status="{entry["status"]}" data-error="{error.get("bound90", "")}">{_slider(sheet, index)}'
         f'<div><h2>{link}</h2><p><b class="{entry["status"].split()[0]}">{entry["status"]}</b> '
         f"{html.escape(', '.join(entry.get('model', ())))} {figures}</p><ul>{notes}</ul></div></article>"
     )

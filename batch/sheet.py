@@ -46,6 +46,8 @@ def _row(cells: Sequence[tuple[str, NDArray[np.uint8]]], width: int) -> NDArray[
 
 def resized(picture: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
     """The picture at another width, filtered, in its own proportions."""
+    if picture.shape[1] == width:
+        return picture
     import OpenImageIO as oiio
 
     height = max(1, round(picture.shape[0] * width / picture.shape[1]))

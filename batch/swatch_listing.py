@@ -8,6 +8,7 @@ from typing import Any
 from ..core import builtin_libraries, metamerism
 from ..core.library import Library
 from ..core.swatch_book import find
+from ..core.swatch_files.printer import inks_as
 from ..core.swatches import Swatch, parse_target
 
 
@@ -18,7 +19,7 @@ def libraries() -> dict[str, Any]:
 
 
 def choose(
-    place: str, search: str = "", nearest: str | None = None, count: int | None = None, plain_inks: bool = False
+    place: str, search: str = "", nearest: str | None = None, count: int | None = None, cmyk: str | None = None
 ) -> tuple[Library, list[float] | None]:
     """Open a library and take some of its swatches.
 
@@ -32,8 +33,8 @@ def choose(
         A color in any of the forms of targets: the nearest first.
     count
         How many; None for all, or ten of the nearest.
-    plain_inks
-        Convert CMYK without a profile.
+    cmyk
+        What CMYK of a file means: a profile, or "plain".
 
     Returns
     -------
@@ -43,7 +44,7 @@ def choose(
         CIEDE2000 of each from `nearest`.
     """
     where, _, name = place.partition("#")
-    library = find(where, inks="plain" if plain_inks else None)
+    library = find(where, inks=inks_as(cmyk) if cmyk else None)
     if name:
         return Library.of(library.name, [library.named(name)], library.notes), None
     chosen = library.search(search)

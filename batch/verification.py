@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core import colorimetry, dichromatic, gamut
-from ..core.analysis import Analysis
+from ..core import colorimetry, dichromatic, gamut, stability
+from ..core.analysis import LARGEST_NOISE_GAIN, Analysis
 from ..core.colorspace import RGBSpace
 from ..core.errors import FileError
 from ..core.picture import Picture, as_weights
@@ -27,10 +27,11 @@ from ..core.reference import check_pixel, read_window, trimmed_mean, window_radi
 from ..core.swatches import Camera, Light, Swatch
 from . import files
 
-# Pixels that are looked at for matte ones, and how near to the reference they are: A around 1, B as a share of white.
+# Pixels that are looked at for matte ones, and how near to the reference these are: A around 1, and the rest of every
+# channel (gloss, residual) as a share of the reference.
 _CANDIDATES = 60_000
-_BODY, _GLOSS = 0.2, 0.02
-_FEWEST = 25
+_BODY, _OFF = 0.2, 0.1
+_FEWEST, _MOST = 25, 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,9 +148,9 @@ def _compare(area: _Area, picture: Picture, back: files.Photo, asked: NDArray, w
     height, width = picture.shape
     if area.rows.max() >= height or area.columns.max() >= width:
         raise FileError(f"'{back.path}' is {width} x {height} pixels, less than was written: write it again.")
-    pixels = picture.at(area.rows, area.columns)
+    pixels: NDArray = picture.at(area.rows, area.columns)
     if back.premultiplied and back.pixels.shape[2] == 4:
-        pixels = pixels / back.pixels[area.rows, area.columns, 3:].astype(np.float32)
+        pixels = pixels / np.asarray(back.pixels[area.rows, area.columns, 3:], np.float32)
     matte = (pixels - area.gloss[:, None] * white) / area.body[:, None]
     return _verification(area.target, asked, trimmed_mean(matte), back, len(matte))
 
@@ -207,13 +208,16 @@ def _matte_pixels(
     rows, columns, pixels = rows[unclipped], columns[unclipped], pixels[unclipped]
     if not len(rows):
         return empty
-    body, gloss = (
-        part[0] for part in dichromatic.fit(pixels[None], analysis.reference, analysis.white, analysis.model)
-    )
-    # As many as are alike; where a product is rough or noisy, the nearest.
-    unlike = np.maximum(np.abs(body - 1) / _BODY, np.abs(gloss) / _GLOSS)
+    # The plain model chooses them, whatever the photo is recolored by: where it fits, all models agree.
+    V, W = analysis.reference, analysis.white
+    model = "dichromatic" if stability.noise_gain(V, W) < LARGEST_NOISE_GAIN else "body"
+    body, gloss = dichromatic.fit(pixels, V, W, model)
+    # Channel by channel, as a weak channel of the old color may be a strong one of the new.
+    off = np.abs(pixels - body[:, None] * V) / np.maximum(np.abs(V), 0.02 * np.abs(V).max())
+    unlike = np.maximum(np.abs(body - 1) / _BODY, off.max(axis=1) / _OFF)
+    # The nearest ones: the color of a product varies, and the reference is one of its colors.
     order = np.argsort(unlike, kind="stable")
-    alike = order[: max(_FEWEST, int(np.count_nonzero(unlike < 1)))]
+    alike = order[: np.clip(np.count_nonzero(unlike < 1), _FEWEST, _MOST)]
     alike = alike[body[alike] > 0.1]
     return rows[alike], columns[alike], body[alike], gloss[alike]
 

@@ -13,19 +13,14 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import dichromatic, stability
 from ..core.errors import DyehouseError, FileError
-from ..core.picture import Picture
 from ..core.recipe import Colorway, Prepared
 from ..core.thumbnail import proxy_of, thumbnail
 from . import files, inspection, journal, photo, sheet, storage
 from .jobs import ASIDE, Job, Want
 
-# Pixels of a region from which its predicted error is told.
-_SAMPLE = 8_000
-
-# Width of a picture on a contact sheet, and pictures in a row.
-CELL, ACROSS = 320, 4
+# Greatest and least width of a picture on a contact sheet, and pictures in a row.
+_WIDEST, _NARROWEST, ACROSS = 360, 200, 4
 
 type Entry = dict[str, Any]
 
@@ -43,7 +38,7 @@ class Task:
     known
         Of an earlier run, the last entries of the job's outputs and sheet.
     max_error
-        CIEDE2000 from which a result needs a person, at the 95th percentile of its region; None: never.
+        CIEDE2000 from which a result needs a person, of the prediction for 90 % of its pixels; None: never.
     allow_warnings
         Whether results with warnings need none.
     sheets
@@ -165,7 +160,7 @@ def _recolored(
         recipe = replace(recipe, camera=str(places[recipe.camera]))
     recipe = replace(recipe, colorways=tuple(want.colorway for want in job.wants))
     prepared = photo.look(opened, recipe, read_mask=lambda name: _mask(places[name], digests[name], opened))
-    proxy = proxy_of(prepared, CELL) if sheet_due else None
+    proxy = proxy_of(prepared, _WIDEST) if sheet_due else None
     cells = []
     if proxy is not None:
         same = Colorway("", (None,) * len(recipe.regions))
@@ -240,18 +235,14 @@ def _written(task: Task, want: Want, opened: files.Photo, own: Prepared, out: ND
 
 
 def predicted_error(own: Prepared) -> dict[str, float]:
-    """Median and 95th percentile of the predicted error over the worst region that is recolored, CIEDE2000."""
-    worst = {"median": 0.0, "p95": 0.0}
+    """CIEDE2000 that half, and 90 %, of the pixels of the worst region are expected to stay below."""
+    worst = {"median": 0.0, "bound90": 0.0}
     for k, analysis in enumerate(own.analyses):
         if own.recipe.regions[k].target is None and np.array_equal(own.white, own.target_white):
             continue
-        target, white = own.target(k), own.target_white
-        carried = dichromatic.carried_residual(analysis.reference, target, analysis.white, white)
-        sample = Picture(analysis.picture.sample(_SAMPLE, analysis.mask)[None])
-        dropped, kept = (analysis.matrix(target, white, share)[:, :3] for share in ("drop", 1 - carried))
-        errors = stability.predicted_error(sample, dropped, kept, analysis.noise, white)
-        figures = {"median": float(np.quantile(errors, 0.5)), "p95": float(np.quantile(errors, 0.95))}
-        worst = max(worst, figures, key=lambda f: f["p95"])
+        found = analysis.predicted(own.target(k), own.target_white)
+        figures = {"median": found.median, "bound90": found.bound90}
+        worst = max(worst, figures, key=lambda f: f["bound90"])
     return {name: round(value, 4) for name, value in worst.items()}
 
 
@@ -259,8 +250,8 @@ def _gate(task: Task, own: Prepared, error: dict[str, float]) -> str:
     """Why a result needs a person; empty if it does not."""
     if task.max_error is None:
         return ""
-    if not error["p95"] <= task.max_error:
-        return f"the predicted error is {error['p95']:.1f} CIEDE2000, more than {task.max_error:g}"
+    if not error["bound90"] <= task.max_error:
+        return f"the predicted error is {error['bound90']:.1f} CIEDE2000, more than {task.max_error:g}"
     return own.warnings[0] if own.warnings and not task.allow_warnings else ""
 
 
@@ -289,7 +280,9 @@ def _remove_other(task: Task, want: Want, file: str) -> None:
 def _sheet(task: Task, cells: list[tuple[str, NDArray[np.uint8]]]) -> Entry:
     """Write the contact sheet of a photo."""
     entry = {"output": task.job.sheet, "status": "sheet", "photo": task.job.photo, "file": task.job.sheet}
-    picture = sheet.contact_sheet([cells[k : k + ACROSS] for k in range(0, len(cells), ACROSS)], CELL)
+    tall, wide = cells[0][1].shape[:2]
+    cell = min(max(wide, _NARROWEST), _WIDEST)
+    picture = sheet.contact_sheet([cells[k : k + ACROSS] for k in range(0, len(cells), ACROSS)], cell)
     try:
         with storage.arriving(_place(task.out, task.job.sheet)) as local:
             files.write(local, picture, files.Photo(Path(), picture, files.SRGB), force=True, quality=88)
@@ -300,6 +293,6 @@ def _sheet(task: Task, cells: list[tuple[str, NDArray[np.uint8]]]) -> Entry:
     return entry | {
         "sha256": digest,
         "size": [width, height],
-        "cell": [CELL, cells[0][1].shape[0] * CELL // cells[0][1].shape[1]],
+        "cell": [cell, round(tall * cell / wide)],
         "cells": [want.output for want in task.job.wants],
     }

@@ -13,15 +13,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import dichromatic, maps, mixture, stability
+from . import confidence, dichromatic, maps, stability
 from . import recolor as recoloring
 from .compositing import Edge, refine_outline, spill_weights
 from .errors import ImageError, ReferenceColorError, WhiteError
+from .mixture import MODELS as _MODELS
+from .mixture import Mixture
 from .picture import Picture, as_mask, as_weights
 from .reference import DARK, Reference, matte_at, matte_reference
-from .selection import Evidence, choose
+from .selection import Evidence, choose, noise_across
 
-MODELS = ("auto", *mixture.MODELS)
+MODELS = ("auto", *_MODELS)
 
 # Noise gain above which the product counts as nearly grey.
 LARGEST_NOISE_GAIN = 6.0
@@ -32,6 +34,9 @@ _UNEXPLAINED = 0.06
 # Gloss in a clicked reference, as a share of the white, from which it is reported.
 _GLOSSY = 0.03
 _SAMPLE = 200_000
+
+# Pixels that the predicted error is found at: for its map, and for the region.
+_MAPPED, _LOOKED_AT = 1_000_000, 4_000
 
 # Share of the picture under which a region is so small that a click has probably missed the product.
 _FEWEST_PIXELS = 0.001
@@ -108,7 +113,7 @@ class Analysis:
         """
         share = dichromatic.residual_share(residual, self.reference, target, self.white, target_white)
         white = self.white if target_white is None else dichromatic.as_white(target_white)
-        return self._mixture.matrix(dichromatic.as_target(target), white, share)
+        return self.mixture.matrix(dichromatic.as_target(target), white, share)
 
     def region(
         self, target: ArrayLike, target_white: ArrayLike | None = None, residual: str | float = "fade"
@@ -146,7 +151,7 @@ class Analysis:
 
         They depend on the photo alone, so that a new target only needs a new matrix.
         """
-        if self._mixture.projector.shape[1] == 3:
+        if self.mixture.projector.shape[1] == 3:
             return None
         return maps.corrections(self._maps, self.mask, self.edge)
 
@@ -163,7 +168,8 @@ class Analysis:
         return maps.Region(self.picture, self.selection, e.mixture, e.noise, clipped, e.below)
 
     @cached_property
-    def _mixture(self) -> mixture.Mixture:
+    def mixture(self) -> Mixture:
+        """The model as :meth:`matrix` uses it, with what restores clipped pixels."""
         return maps.with_corrections(self.evidence.mixture, self._maps.clipped)
 
     @cached_property
@@ -185,7 +191,7 @@ class Analysis:
 
     @cached_property
     def _coefficients(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        rows = np.stack([self._mixture.coefficient(term) for term in ("body", "white")]).astype(np.float32)
+        rows = np.stack([self.mixture.coefficient(term) for term in ("body", "white")]).astype(np.float32)
         both = self.picture.linear() @ rows[:, :3].T
         if self.extra is not None:
             both += self.extra @ rows[:, 3:].T
@@ -207,7 +213,7 @@ class Analysis:
         return self._left_over(self.picture.linear(), self.extra)
 
     def _left_over(self, linear: NDArray, extra: NDArray | None) -> NDArray[np.float32]:
-        matrix = self._mixture.left_over.astype(np.float32)
+        matrix = self.mixture.left_over.astype(np.float32)
         left = linear @ matrix[:, :3].T
         if extra is not None:
             left += extra @ matrix[:, 3:].T
@@ -219,11 +225,7 @@ class Analysis:
         return stability.estimate_noise(self.picture)
 
     def predicted_error(self, target: ArrayLike, target_white: ArrayLike | None = None) -> NDArray[np.float32]:
-        """Estimate of the color error of a recolor, before it is made.
-
-        Two parts, added as squares. What the model does not explain of a pixel may or may not belong to the new
-        color: the difference between carrying the residual over whole and dropping it, which counts the more the
-        farther the target is. And the photo's noise, as the recolor matrix multiplies it beyond what the photo has.
+        """Color error to expect of a recolor at every pixel, before it is made; see `confidence`.
 
         Parameters
         ----------
@@ -232,22 +234,61 @@ class Analysis:
 
         Returns
         -------
-        (height, width) float32 CIEDE2000, 0 outside the mask. A first-order estimate, not calibrated.
+        (height, width) float32 CIEDE2000, calibrated on the laboratory: half of the pixels stay below it, 90 % below
+        `confidence.PIXEL_BOUND` times it. 0 outside the selection. Large photos are looked at on a grid.
         """
-        return stability.predicted_error(
+        doubt = self.doubt(target, target_white)
+        height, width = self.picture.shape
+        step = max(1, int(np.ceil(np.sqrt(height * width / _MAPPED))))
+        inside = np.ones((height, width), bool) if self.selection is None else as_weights(self.selection) > 0
+        rows, columns = np.nonzero(inside[::step, ::step])
+        coarse = np.zeros(inside[::step, ::step].shape, np.float32)
+        for start in range(0, len(rows), _SAMPLE):
+            part = slice(start, start + _SAMPLE)
+            coarse[rows[part], columns[part]] = doubt.errors(rows[part] * step, columns[part] * step)
+        if step > 1:
+            coarse = coarse.repeat(step, axis=0)[:height].repeat(step, axis=1)[:, :width]
+        return np.where(inside, coarse, np.float32(0))
+
+    def predicted(self, target: ArrayLike, target_white: ArrayLike | None = None) -> confidence.Prediction:
+        """Color error to expect of the region as a whole, before it is recolored.
+
+        Parameters
+        ----------
+        target, target_white
+            As for :meth:`matrix`.
+        """
+        prediction = self.doubt(target, target_white).predict(*self._looked_at)
+        return replace(prediction, warnings=(*prediction.warnings, *self.warnings))
+
+    def doubt(self, target: ArrayLike, target_white: ArrayLike | None = None) -> confidence.Doubt:
+        """What the prediction for one target is made from."""
+        white = self.white if target_white is None else dichromatic.as_white(target_white)
+        v, e = dichromatic.as_target(target), self.evidence
+        noise = e.noise if e.noise.read else noise_across(self.picture, self.reference, self.white)
+        return confidence.Doubt(
             self.picture,
-            self.matrix(target, target_white, "drop"),
-            self.matrix(
-                target, target_white, 1 - dichromatic.carried_residual(self.reference, target, self.white, target_white)
-            ),
-            self.noise,
-            self.white if target_white is None else dichromatic.as_white(target_white),
-            self.selection,
             self.extra,
+            self.mixture,
+            self.matrix(v, white),
+            v,
+            white,
+            noise,
+            self.noise_gain,
+            e.figures.get("split_noise", 0.0),
         )
 
+    @cached_property
+    def _looked_at(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of pixels all over the region, well inside it."""
+        height, width = self.picture.shape
+        cover = np.ones((height, width), np.float32) if self.selection is None else as_weights(self.selection)
+        rows, columns = np.nonzero(cover > 0.95 * min(1.0, float(cover.max())))
+        step = max(1, len(rows) // _LOOKED_AT)
+        return rows[step // 2 :: step], columns[step // 2 :: step]
+
     def thinned(self, step: int) -> Analysis:
-        """Return the same findings on every step-th pixel of every step-th row, for small maps."""
+        """Return the same findings on every step-th pixel of every step-th row, for small maps of A, B and residual."""
         if step == 1:
             return self
 
@@ -257,8 +298,7 @@ class Analysis:
         picture = Picture(thin(self.picture.pixels), self.picture.curve)
         small = replace(self, picture=picture, selection=thin(self.selection))
         # What was found in the whole photo is not to be found again in the small one.
-        kept = {"extra": thin(self.extra), "noise": self.noise, "_maps": self._maps, "_mixture": self._mixture}
-        small.__dict__.update(kept, _outline=(thin(self.mask), None))
+        small.__dict__.update(extra=thin(self.extra), _maps=self._maps, mixture=self.mixture)
         return small
 
     @cached_property

@@ -159,5 +159,6 @@ def _means(values: NDArray[np.float32], step: int) -> NDArray[np.float32]:
             part = values[start::step]
             sums[: len(part)] += part
         sizes = np.minimum(step, length - step * np.arange(len(sums)))
-        values = np.moveaxis(sums / sizes.astype(np.float32)[:, None, None], 0, axis)
+        sums /= sizes[:, None, None]
+        values = np.moveaxis(sums, 0, axis)
     return values

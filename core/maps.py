@@ -75,7 +75,8 @@ class Region:
         if self.selection is not None:
             whole = as_weights(self.selection[rows, columns]) > _WHOLE
         over = (linear >= self.picture.clip_level).any(axis=2)
-        return linear / self.mixture.white.astype(np.float32), whole, over & whole
+        balanced: NDArray[np.float32] = np.divide(linear, self.mixture.white, dtype=np.float32)
+        return np.clip(balanced, -_HUGE, _HUGE, out=balanced), whole, over & whole
 
 
 def with_corrections(mixture: Mixture, clipped: bool) -> Mixture:
@@ -177,7 +178,7 @@ def _lerp(values: NDArray, at: NDArray, axis: int) -> NDArray:
 def _moments(region: Region, axes: Frame, rows: slice, columns: slice) -> NDArray[np.float32]:
     """(h, w, 9) weight, light, its square, and for both colors across: themselves, squares, products with light."""
     pixels, whole, over = region.balanced(rows, columns)
-    light, y1, y2 = np.moveaxis(np.clip(pixels, -_HUGE, _HUGE) @ _basis(axes), -1, 0)
+    light, y1, y2 = np.moveaxis(pixels @ _basis(axes), -1, 0)
     weight = (whole & ~over).astype(np.float32)
     parts = [np.ones_like(light), light, light * light, y1, y2, y1 * y1, y2 * y2, y1 * light, y2 * light]
     return np.stack(parts, axis=-1) * weight[..., None]
@@ -267,7 +268,8 @@ def _outline(region: Region, axes: Frame, mask: NDArray | None, edge: Edge | Non
         beside = np.isin(places, here, assume_unique=True)
         cover = as_weights(mask[edge.rows[beside], edge.columns[beside]])
         light[np.searchsorted(here, places[beside])] = edge.share[beside] / np.maximum(cover, 1e-6)[:, None]
-    along, *across = np.moveaxis((light / region.mixture.white.astype(np.float32)) @ _basis(axes), -1, 0)
+    balanced = np.clip(light / region.mixture.white.astype(np.float32), -_HUGE, _HUGE)
+    along, *across = np.moveaxis(balanced @ _basis(axes), -1, 0)
     safe = np.maximum(along, _floor(axes))
     maps, _ = _told_apart(region, axes, safe, np.stack(across), region.noise.at(safe) ** 2)
     for k, told in enumerate(maps):

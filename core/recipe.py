@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +19,7 @@ from .dichromatic import as_white
 from .errors import MaskError, RecipeError, TargetError
 from .picture import Picture, as_mask
 from .recolor import RegionMatrix
-from .reference import white_at, white_from_highlights
+from .reference import SURE_WHITE, white_at, white_from_highlights
 from .region import region_from_clicks
 from .swatches import Swatch
 
@@ -47,13 +48,18 @@ class Region:
     tolerance
         Of a clicked region, see :func:`region.region_from_clicks`.
     meaning
-        "reference": the reference pixel shall have the target color. "product": the product shall have the target
-        reflectance, in the light that falls on the reference.
+        "reference": the product shall have the target color in the light that falls on the reference pixel. A matte
+        pixel reads exactly that; gloss in it is found and stays on top. (For a target that was read with its gloss
+        give the reference as a color.) "product": the product shall have the target reflectance, in the light that
+        falls on the reference.
     source
         The product's present color as a swatch: from it and the reference, "product" takes the exposure. Without
         it the white must have been read where the reference is.
     model, residual
         See :func:`analysis.analyze` and :meth:`analysis.Analysis.matrix`.
+    spill
+        Recolor what shows of the product outside the mask too: the rim that a mask too tight leaves, and the light
+        thrown on a neutral surround.
     name
         What the user calls it; colorways in recipe files and warnings name regions by it.
     """
@@ -70,6 +76,7 @@ class Region:
     name: str = ""
     added: tuple[tuple[int, int], ...] = ()
     removed: tuple[tuple[int, int], ...] = ()
+    spill: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,6 +153,8 @@ class Prepared:
         One for each region.
     white_source
         Where the white came from, in words.
+    white_warnings
+        Sentences for the user about the white, each with a remedy.
     """
 
     recipe: Recipe
@@ -154,6 +163,7 @@ class Prepared:
     target_white: NDArray[np.float64]
     analyses: tuple[Analysis, ...]
     white_source: str
+    white_warnings: tuple[str, ...] = ()
 
     def target(self, index: int = 0, swatch: Swatch | None = None) -> NDArray[np.float64]:
         """(3,) linear RGB that region `index` shall have at its reference, V', for its own or another swatch."""
@@ -194,13 +204,20 @@ class Prepared:
         """Return the same analyses with the targets of a colorway, without another look at the photo."""
         return replace(self, recipe=with_colorway(self.recipe, colorway))
 
-    @property
+    @cached_property
     def warnings(self) -> list[str]:
-        """Sentences for the user, of all regions."""
-        many = len(self.analyses) > 1
-        names = [f"Region '{r.name}'" if r.name else f"Region {k + 1}" for k, r in enumerate(self.recipe.regions)]
-        pairs = zip(names, self.analyses, strict=True)
-        return [f"{name}: {warning}" if many else warning for name, a in pairs for warning in a.warnings]
+        """Sentences for the user: about the white, and all regions that the recipe's targets or colorways change."""
+        said = list(self.white_warnings)
+        for k, (region, analysis) in enumerate(zip(self.recipe.regions, self.analyses, strict=True)):
+            asked = [region.target, *(colorway.targets[k] for colorway in self.recipe.colorways)]
+            if all(target is None for target in asked) and np.array_equal(self.white, self.target_white):
+                continue
+            name = f"Region '{region.name}'" if region.name else f"Region {k + 1}"
+            found = analysis.warnings
+            if region.target is not None:
+                found = analysis.predicted(self.target(k), self.target_white).warnings
+            said += [f"{name}: {warning}" if len(self.analyses) > 1 else warning for warning in found]
+        return said
 
 
 def check(recipe: Recipe) -> None:
@@ -268,15 +285,21 @@ def prepare(
     check(recipe)
     white, source = white_asked(picture, recipe, space, photo_white)
     masks = [_mask(picture, region, white, alpha, read_mask) for region in recipe.regions]
+    unsure: tuple[str, ...] = ()
     if recipe.white == "highlights":
         white, confidence = white_from_highlights(picture, light_colors(space), masks[0])
         source = f"highlights (confidence {confidence:.0%})"
+        if confidence < SURE_WHITE:
+            unsure = (
+                f"The highlights tell the color of the light with {confidence:.0%} confidence only: click a white or "
+                "grey card, or name the light.",
+            )
     has_white = recipe.white is not None or photo_white is not None
     analyses = tuple(
-        analyze(picture, white if has_white else None, region.reference, mask, region.model)
+        analyze(picture, white if has_white else None, region.reference, mask, region.model, region.spill)
         for region, mask in zip(recipe.regions, masks, strict=True)
     )
-    return Prepared(recipe, space, white, _target_white(recipe, space, white), analyses, source)
+    return Prepared(recipe, space, white, _target_white(recipe, space, white), analyses, source, unsure)
 
 
 def light_colors(space: RGBSpace) -> NDArray[np.float64]:

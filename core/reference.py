@@ -19,6 +19,11 @@ from .picture import Picture, as_weights
 # Linear luminance under which a pixel is too dark, relative to white, to tell its color from noise.
 DARK = 0.004
 
+# Confidence in a white from highlights under which the user should be asked; and what a score of highlights and plane
+# is worth, counted by `uv run --group bench python -m dyehouse.benchmarks.calibration`.
+SURE_WHITE = 0.75
+_CHANCES = (0.0, 0.65, 0.75, 1.0), (0.35, 0.45, 0.8, 0.95)
+
 # Pixels that a search looks at; more do not change the answer.
 _SAMPLE = 60_000
 
@@ -337,7 +342,8 @@ def white_from_highlights(
     white
         (3,) float64, of luminance 1.
     confidence
-        0..1: how clearly highlights stand out and how sharply the plane cuts the locus.
+        0..1: the chance that it is within 3 degrees of the truth, as counted in the laboratory, by how clearly
+        highlights stand out and how sharply the plane cuts the locus. Under `SURE_WHITE` the user should be asked.
 
     Raises
     ------
@@ -380,4 +386,4 @@ def white_from_highlights(
     near = lights[off < off[best] + 0.02]
     spread = np.degrees(np.arccos(np.clip(near @ near.T, -1, 1))).max()
     sharp = 1 - min(1.0, float(spread) / 25)
-    return locus[best].astype(np.float64), float(np.clip(flat * sharp, 0, 1))
+    return locus[best].astype(np.float64), float(np.interp(flat * sharp, *_CHANCES))

@@ -301,10 +301,11 @@ def _plain(seen: _Seen) -> dict[str, float]:
 def _matte(seen: _Seen, feedback: float) -> float:
     """Share that body and bounce without gloss do not explain."""
     axes = frame(seen.body, feedback)
-    size = float(np.hypot(*axes.bounce[1:]))
+    size = float(np.linalg.norm(axes.bounce[1:]))
     if size < 1e-9:
         return 1.0
-    along, off = axes.bounce[1:] / size, np.array([-axes.bounce[2], axes.bounce[1]]) / size
+    along = np.array(axes.bounce[1:]) / size
+    off = np.array([-along[1], along[0]])
     y = seen.pixels @ axes.across.T
     # Bounce in units of the body's light, as in `split`.
     bounce, spread = (y @ along) * axes.length / size, seen.noise * axes.length / size

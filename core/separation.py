@@ -58,8 +58,8 @@ class Frame:
     along: NDArray[np.float64]
     across: NDArray[np.float64]
     length: float
-    white: NDArray[np.float64]
-    bounce: NDArray[np.float64]
+    white: tuple[float, ...]
+    bounce: tuple[float, ...]
 
 
 def frame(body: NDArray, feedback: float = 0.0) -> Frame:
@@ -73,7 +73,8 @@ def frame(body: NDArray, feedback: float = 0.0) -> Frame:
         size = float(np.linalg.norm(toward))
     first = toward / size
     axes = np.stack([along, first, np.cross(along, first)])
-    return Frame(along, axes[1:], length, axes @ np.ones(3), axes @ bounced(body, feedback))
+    white, bounce = ((axes @ color).tolist() for color in (np.ones(3), bounced(body, feedback)))
+    return Frame(along, axes[1:], length, tuple(white), tuple(bounce))
 
 
 def split(
@@ -115,30 +116,24 @@ def split(
     total = variance + (MODEL_ERROR * light) ** 2
     (e1, e2), (f1, f2) = axes.white[1:], axes.bounce[1:]
     y1, y2 = across
-    b, c = np.zeros_like(light), np.zeros_like(light)
     shine, folded = total / light**2, total / (light / axes.length) ** 2
-    for wide_b in (True, False) if gloss else (True,):
-        for wide_c in (True, False) if bounce else (True,):
-            r1, r2 = e1 * y1 + e2 * y2, f1 * y1 + f2 * y2
-            a11 = e1 * e1 + e2 * e2 + shine / (_GLOSS if wide_b else below) ** 2
-            a22 = f1 * f1 + f2 * f2 + folded / (USUAL_BOUNCE if wide_c else _NO_BOUNCE) ** 2
-            a12 = e1 * f1 + e2 * f2
-            if not bounce:
-                b_here, c_here = r1 / a11, 0.0
-            elif not gloss:
-                b_here, c_here = 0.0, r2 / a22
-            else:
+    r1, r2 = e1 * y1 + e2 * y2, f1 * y1 + f2 * y2
+    b, c = np.zeros_like(light), np.zeros_like(light)
+    if gloss and bounce:
+        a12 = e1 * f1 + e2 * f2
+        for width_b, above_b in ((_GLOSS, True), (below, False)):
+            a11 = e1 * e1 + e2 * e2 + shine / width_b**2
+            for width_c, above_c in ((USUAL_BOUNCE, True), (_NO_BOUNCE, False)):
+                a22 = f1 * f1 + f2 * f2 + folded / width_c**2
                 scale = 1 / (a11 * a22 - a12 * a12)
                 b_here, c_here = (a22 * r1 - a12 * r2) * scale, (a11 * r2 - a12 * r1) * scale
-            own = np.ones(light.shape, bool)
-            if gloss:
-                own &= (b_here >= 0) == wide_b
-            if bounce:
-                own &= (c_here >= 0) == wide_c
-            if gloss:
+                own = ((b_here >= 0) == above_b) & ((c_here >= 0) == above_c)
                 np.copyto(b, b_here, where=own)
-            if bounce:
                 np.copyto(c, c_here, where=own)
+    elif gloss:
+        b = r1 / (e1 * e1 + e2 * e2 + shine * np.where(r1 >= 0, _GLOSS**-2, below**-2).astype(light.dtype))
+    elif bounce:
+        c = r2 / (f1 * f1 + f2 * f2 + folded * np.where(r2 >= 0, USUAL_BOUNCE**-2, _NO_BOUNCE**-2).astype(light.dtype))
     left = ((y1 - e1 * b - f1 * c) ** 2 + (y2 - e2 * b - f2 * c) ** 2) / total
     if gloss:  # what single pixels do not prove is none
         doubt = 4 * variance / np.maximum(axes.white[1] ** 2 * b * b, 1e-30)

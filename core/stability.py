@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .colorimetry import delta_e_2000, xyz_to_lab
-from .colorspace import LINEAR_SRGB
 from .dichromatic import sine
-from .picture import Picture, bands
+from .picture import Picture
 
 
 def noise_gain(reference: NDArray, white: NDArray) -> float:
@@ -81,60 +79,3 @@ def estimate_noise(picture: Picture) -> Noise:
     if read < 0:
         read, shot = 0.0, float((a[:, 1] * v * k * k).sum() / (a[:, 1] ** 2 * k * k).sum())
     return Noise(max(quiet.read, float(np.sqrt(max(read, 0.0)))), max(float(shot), 0.0))
-
-
-def predicted_error(
-    picture: Picture,
-    dropped: NDArray,
-    kept: NDArray,
-    noise: Noise,
-    white: NDArray,
-    mask: NDArray | None = None,
-    extra: NDArray | None = None,
-) -> NDArray[np.float32]:
-    """First-order estimate of the color error of a recolor; see `Analysis.predicted_error`.
-
-    Parameters
-    ----------
-    picture
-        The photo.
-    dropped, kept
-        (3, 3 + n) recolor matrices that drop the residual, and that carry over as much of it as may be wrong.
-    noise
-        Noise of the photo.
-    white
-        (3,) white of the result, for the color difference.
-    mask
-        (height, width) checked coverage, or None.
-    extra
-        (height, width, n) corrections that the matrices take, or None.
-
-    Returns
-    -------
-    (height, width) float32 CIEDE2000, 0 outside the mask.
-    """
-    height, width = picture.shape
-    # The difference is taken in white-balanced Rec.709 whatever the photo's primaries: it is an estimate.
-    to_xyz = LINEAR_SRGB.to_xyz / white
-    reference_white = LINEAR_SRGB.white
-    out = np.zeros((height, width), np.float32)
-
-    def lab(pixels: NDArray) -> NDArray:
-        return xyz_to_lab((pixels @ to_xyz.T).astype(np.float32), reference_white)
-
-    # Noise that comes out beyond what went in: the root of the mean gain over the channels.
-    gain = float(np.sqrt(max(0.0, (np.linalg.norm(dropped, "fro") ** 2 - 3) / 3)))
-    for rows in bands(height, width):
-        inside = slice(None) if mask is None else mask[rows].reshape(-1) > 0
-        pixels = picture.linear(rows).reshape(-1, 3)[inside]
-        if len(pixels) == 0:
-            continue
-        if extra is not None:
-            pixels = np.concatenate([pixels, extra[rows].reshape(-1, extra.shape[2])[inside]], axis=1)
-        plain = pixels @ dropped.T
-        result = lab(plain)
-        model = delta_e_2000(lab(pixels @ kept.T), result)
-        sigma = gain * noise.at(pixels[:, :3].mean(axis=1))
-        noisy = delta_e_2000(lab(plain + sigma[:, None]), result)
-        out[rows].reshape(-1)[inside] = np.hypot(model, noisy)
-    return out

@@ -89,7 +89,7 @@ class DYEHOUSE_OT_add_compositor_group(RecipeArguments, bpy.types.Operator):
             prepared = self._without_picture(space)
         else:
             try:
-                _, prepared = texture.look(texture.tile)
+                prepared = texture.first
                 if space == nodes.WORKING:
                     prepared = _without_maps(prepared)
                 else:
@@ -170,7 +170,7 @@ class DYEHOUSE_OT_add_compositor_group(RecipeArguments, bpy.types.Operator):
         from ...core.recipe import prepare
 
         known = images.working_space() if space == nodes.WORKING else space_named(space)
-        return prepare(Picture(np.float32([[self.reference_color]])), self.recipe(space), space=known)
+        return prepare(Picture(np.array([[self.reference_color]], np.float32)), self.recipe(space), space=known)
 
     def _feed(self, node: bpy.types.Node, scene: bpy.types.Scene, mask: bpy.types.Image | None) -> None:
         """Connect mask or matte of a render."""

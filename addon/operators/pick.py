@@ -104,11 +104,15 @@ class _Eyedropper(common.ImageOperator):
     @common.reporting
     def execute(self, context):
         """Take the pixel that is given."""
+        from ...core.errors import ImageError
+
         image = common.editable(common.image_of(context, self.image))
         pixel = (self.pixel[0], self.pixel[1])
+        if pixel == NOWHERE:
+            raise ImageError("No pixel is given: give pixel=(x, y), or start the eyedropper in a window.")
         reading = self.read(image, session.photo_of(image), pixel)
         self.take(image, pixel, None)
-        self._say(reading)
+        _say(self, reading)
 
     @common.reporting
     def invoke(self, context, event):
@@ -196,12 +200,13 @@ class _Eyedropper(common.ImageOperator):
             return False
         self.pixel = found[1]
         context.workspace.status_text_set(self.hint)
-        self._say(reading)
+        _say(self, reading)
         return done
 
-    def _say(self, reading: loupe.Reading) -> None:
-        for sentence in reading.words:
-            self.report({"WARNING"}, sentence)
+
+def _say(operator: bpy.types.Operator, reading: loupe.Reading) -> None:
+    for sentence in reading.words:
+        operator.report({"WARNING"}, sentence)
 
 
 class DYEHOUSE_OT_pick_reference(_Eyedropper, bpy.types.Operator):
@@ -221,7 +226,7 @@ class DYEHOUSE_OT_pick_reference(_Eyedropper, bpy.types.Operator):
         if known is not None:
             white = known.prepared.white
         else:
-            white, _ = white_asked(picture, recipes.recipe_of(image), photo.space, photo.white)
+            white, _ = white_asked(picture, recipes.without_regions(image), photo.space, photo.white)
         found = matte_at(picture, pixel, white)
         model = common.region_of(image).model if image.dyehouse.regions else "auto"
         return loupe.Reading(found.color, reference_warnings(found, white, model))

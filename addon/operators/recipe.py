@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from .. import images, masks, recipes, session, writing
 from . import common
+from .regions import free_name
 
 if TYPE_CHECKING:
     from ...core.recipe import Recipe
@@ -60,10 +61,10 @@ class DYEHOUSE_OT_save_recipe(_RecipeFile, common.RegionOperator, bpy.types.Oper
         photo = images.file_of(image)
         stored = recipe_file.StoredRecipe(
             recipe,
-            photo=str(photo) if photo else None,
+            photo=_from(path.parent, photo) if photo else None,
             color_space=images.color_space_name(image),
             output=_output(image),
-            folder=Path(recipes.folder_of(image) or "."),
+            folder=path.parent,
         )
         recipe_file.write_recipe(path, stored, force=self.overwrite)
         if photo is None:
@@ -126,6 +127,13 @@ def _exists(path: Path) -> Exception:
     return FileError(f"'{path}' exists already: choose another name, or allow it to be overwritten.")
 
 
+def _from(folder: Path, path: Path) -> str:
+    """A path as a recipe in a folder names it: relative if it lies there, so that both can be moved together."""
+    absolute = path.absolute()
+    inside = absolute.is_relative_to(folder.absolute())
+    return absolute.relative_to(folder.absolute()).as_posix() if inside else str(absolute)
+
+
 def _check_names(kind: str, names: list[str]) -> None:
     from ...core.errors import RecipeError
 
@@ -154,12 +162,13 @@ def _with_mask_files(
         if source is not None:
             file = source.file
             if file is None or (orientation > 1 and not source.upright):
-                file = path.with_name(f"{path.stem}-{re.sub(r'[^\\w-]+', '-', region.name)}-mask.png")
+                stem = f"{path.stem}-{re.sub(r'[^\w-]+', '-', region.name)}-mask"
+                file = path.with_name(free_name(stem, [p.stem for p in written]) + ".png")
                 if file.exists() and not overwrite:
                     raise _exists(file)
                 writing.save_mask(file, turned(source.load(shape)(), orientation))
                 written.append(file)
-            region = replace(region, mask=str(file.absolute()))
+            region = replace(region, mask=_from(path.parent, file))
         regions.append(region)
     return replace(recipe, regions=tuple(regions)), written
 

@@ -112,7 +112,7 @@ def _light(text: str) -> str | tuple[float, ...] | None:
 def fill(node: bpy.types.Node, prepared: "Prepared", index: int = 0) -> None:
     """Set a recolor node to what was found in a picture."""
     residual = prepared.recipe.regions[index].residual
-    nodes.fill(node, prepared.analyses[index]._mixture, prepared.target(index), prepared.target_white, residual)
+    nodes.fill(node, prepared.analyses[index].mixture, prepared.target(index), prepared.target_white, residual)
 
 
 class MaterialOperator:
@@ -120,6 +120,9 @@ class MaterialOperator:
 
     Material and node are given by name, or are those in context; scripts need no context at all.
     """
+
+    poll_message_set: Any
+    execute: Any
 
     material: StringProperty(
         name="Material", description="Name of the material; empty for the active one", options={"SKIP_SAVE"}
@@ -305,7 +308,7 @@ class DYEHOUSE_OT_recolor_texture(TextureArguments, bpy.types.Operator):
         texture = self.found_texture(material)
         opened = self.opened(texture.image)
         try:
-            prepared = opened.look(opened.tile)[1]
+            prepared = opened.first
             index = texture.image.dyehouse.active_region if self.image_settings else 0
             maps = textures.map_images(opened, index, textures.straight(texture))
         finally:
@@ -434,6 +437,7 @@ class DYEHOUSE_OT_bake_texture(TextureArguments, bpy.types.Operator):
         _end()
 
     def _job(self, context: bpy.types.Context) -> "_Job":
+        from ...core.errors import DyehouseError
         from .. import textures
 
         material = self.found_material(context)
@@ -441,10 +445,17 @@ class DYEHOUSE_OT_bake_texture(TextureArguments, bpy.types.Operator):
             editable(material)
         node = self.found_texture(material)
         live = nodes.after(node.outputs["Color"])
+        texture: textures.Texture | textures.Live
         if live is None or any(self.properties.is_property_set(name) for name in _ASKING):
             texture = self.opened(node.image)
         else:
             texture = textures.Live(node, live)
+        if self.output:
+            try:
+                texture.check(common.absolute(self.output))
+            except DyehouseError:
+                texture.close()
+                raise
         return _Job(texture, material.name, node.name, node.image.name)
 
     def _finish(self, job: "_Job", tiles: "dict[int, textures.Baked]") -> None:

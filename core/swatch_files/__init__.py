@@ -43,7 +43,8 @@ def read(path: str | Path, inks: Inks | None = None) -> Library:
         A file of one of the kinds of `FORMATS` by its extension, or a folder, whose files become groups; files of the
         folder that cannot be read are told of in the notes.
     inks
-        What CMYK means: see :data:`reading.Inks`. Without it CMYK swatches are left out, and a note says so.
+        What CMYK means: see :data:`reading.Inks`, and `printer.inks_as` for a profile. Without it CMYK swatches are
+        left out, and a note says so.
 
     Raises
     ------

@@ -57,11 +57,18 @@ def _add_color(block: Bytes, found: Collector, group: str) -> None:
         found.add_inks(numbers, name, group)
     elif model == b"LAB ":
         L, a, b = numbers
-        found.add(Swatch(name, Swatch.from_lab((100 * L, a, b)).color), group)
+        # Beyond the fifth decimal is only the rounding of the file's short floats.
+        found.add(Swatch(name, Swatch.from_lab([round(v, 5) for v in (100 * L, a, b)]).color), group)
     else:
         found.note("RGB and grey of the file name no color space: taken as sRGB.")
-        red, green, blue = numbers if model == b"RGB " else 3 * numbers
+        red, green, blue = (_code(v) for v in (numbers if model == b"RGB " else 3 * numbers))
         found.add(Swatch(name, Encoded((red, green, blue))), group)
+
+
+def _code(value: float) -> float:
+    """The code of 8 bits that a short float stands for, or itself."""
+    nearest = round(255 * value) / 255
+    return nearest if abs(nearest - value) < 1e-7 else value
 
 
 def write(library: Library) -> tuple[bytes, list[str]]:

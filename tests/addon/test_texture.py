@@ -385,6 +385,46 @@ def test_a_bake_into_a_file_never_overwrites_one(material: bpy.types.Material, t
     assert len(list(tmp_path.iterdir())) == 2
 
 
+def test_a_bake_that_is_stopped_leaves_nothing(material: bpy.types.Material, tiled: Tiled, tmp_path: Path) -> None:
+    """What Esc does: the next sign of progress raises."""
+
+    class StoppedError(Exception):
+        pass
+
+    shares = []
+
+    def watch(share: float) -> None:
+        shares.append(share)
+        if share > 0.5:
+            raise StoppedError
+
+    texture = textures.Texture(tiled.image, recipe(model="dichromatic"))
+    with pytest.raises(StoppedError):
+        texture.bake(watch)
+    assert shares == sorted(shares)
+    texture.close()
+    assert not texture.folder.exists()
+    assert {image.name for image in bpy.data.images} == {"colors", "masks"}
+
+
+def test_every_region_of_the_image_editor_is_baked(material: bpy.types.Material, tmp_path: Path) -> None:
+    path = written(tmp_path / "8-bit.png")
+    texture = texture_of(material, path)
+    left, right = coverage().copy(), coverage().copy()
+    left[:, 22:], right[:, :22] = 0, 0
+    asked = []
+    for name, values, code in (("left", left, "#1F4E79"), ("right", right, "#C28A1E")):
+        file = mask_file(tmp_path / f"{name}.png", values)
+        region = texture.image.dyehouse.regions.add()
+        region.mask_source, region.mask_image = "IMAGE", bpy.data.images.load(str(file))
+        region.target.text = code
+        asked.append(Region(parse_target(code), mask=str(file)))
+    assert bpy.ops.dyehouse.bake_texture(material="Flat", image_settings=True, name="done") == {"FINISHED"}
+    photo = files.read(path)
+    expected = photos.recolored(photo, photos.look(photo, Recipe(tuple(asked))), path)[0]
+    assert np.array_equal(codes_of(bpy.data.images["done"], tmp_path)[1001], expected)
+
+
 def test_tiles_go_into_files_of_their_own(material: bpy.types.Material, tiled: Tiled, tmp_path: Path) -> None:
     node_renders.textured(material, tiled.image)
     arguments = {"material": "Flat", "reference": MATTE, "target": TARGET, "model": "dichromatic"}

@@ -112,7 +112,7 @@ def test_the_journal_tells_what_was_done(run, shop, tmp_path):
     assert entry["source"] == f"'{shop}', row 2"
     assert entry["sha256"] == files_of(tmp_path / "out")["ball0-navy.png"]
     assert set(entry) >= {"input", "settings", "model", "predicted_error", "warnings", "seconds", "colorway", "photo"}
-    assert 0 <= entry["predicted_error"]["median"] <= entry["predicted_error"]["p95"]
+    assert 0 <= entry["predicted_error"]["median"] <= entry["predicted_error"]["bound90"]
     assert entries["sheets/ball0.jpg"]["cells"] == ["ball0-navy.png", "ball0-green.png"]
 
 

@@ -332,7 +332,7 @@ def test_inspect_maps(run, shop):
     code, said, _ = run(*options, "--maps", folder, "--json")
     assert code == 0
     maps = {Path(p).name: Path(p) for p in json.loads(said)["maps"]}
-    assert set(maps) == {"A.png", "B.png", "residual.png", "error.png", "mask.png"}
+    assert set(maps) == {"A.png", "B.png", "residual.png", "error.png", "mask.png", "gamut.png"}
     assert set(folder.iterdir()) == set(maps.values())
     analysis = analyze(Picture(shop.codes, transfer.SRGB), reference=shop.matte, mask=shop.cover)
     a = np.array(Image.open(maps["A.png"]).convert("RGB"))[..., 0] / 255

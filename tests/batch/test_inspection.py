@@ -114,6 +114,7 @@ def test_maps_of_two_regions_have_numbers(looked_at, tmp_path):
     assert names == {
         "ball-1-A.png", "ball-1-B.png", "ball-1-residual.png", "ball-1-error.png", "ball-1-mask.png",
         "ball-2-A.png", "ball-2-B.png", "ball-2-residual.png", "ball-2-error.png",
+        "ball-1-gamut.png", "ball-2-gamut.png",
     }  # fmt: skip
     assert {p.name for p in (tmp_path / "new" / "maps").iterdir()} == names
     error = files.read(tmp_path / "new" / "maps" / "ball-1-error.png").pixels

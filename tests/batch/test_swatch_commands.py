@@ -65,7 +65,7 @@ def test_plain_inks(capsys, tmp_path):
     status, _, err = run(capsys, "swatches", str(tmp_path / "x.aco"))
     assert status == 2
     assert "profile of its printer" in err
-    (row,) = figures(capsys, "swatches", str(tmp_path / "x.aco"), "--plain-cmyk")["swatches"]
+    (row,) = figures(capsys, "swatches", str(tmp_path / "x.aco"), "--cmyk", "plain")["swatches"]
     assert row["srgb"] == "#00FFFF"
 
 

@@ -68,6 +68,7 @@ regions = st.builds(
     name=texts,
     added=st.lists(pixels, max_size=2).map(tuple),
     removed=st.lists(pixels, max_size=2).map(tuple),
+    spill=st.booleans(),
 )
 
 
@@ -103,7 +104,19 @@ def test_every_recipe_comes_back_exactly(stored):
 
 def test_the_strategy_above_knows_every_attribute():
     # A new attribute of Region must be added to it, or its round trip is not tested.
-    drawn = {"target", "reference", "mask", "click", "tolerance", "meaning", "source", "model", "residual", "name"}
+    drawn = {
+        "target",
+        "reference",
+        "mask",
+        "click",
+        "tolerance",
+        "meaning",
+        "source",
+        "model",
+        "residual",
+        "name",
+        "spill",
+    }
     assert {f.name for f in dataclasses.fields(Region)} - drawn - {"added", "removed"} == set()
 
 

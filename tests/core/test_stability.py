@@ -4,8 +4,7 @@ import colour
 import numpy as np
 import pytest
 
-from dyehouse.core import analyze, stability
-from dyehouse.core.colorspace import SRGB
+from dyehouse.core import stability
 from dyehouse.core.picture import Picture
 
 
@@ -70,61 +69,3 @@ def test_edges_are_not_noise():
 def test_noise_of_tiny_pictures(shape):
     found = stability.estimate_noise(Picture(np.full((*shape, 3), 0.3, np.float32)))
     assert np.isfinite(found.at(np.array([0, 0.5, 1]))).all()
-
-
-# --- predicted error ------------------------------------------------------------------------------------------
-
-
-def test_predicted_error_is_near_zero_for_the_own_color_of_an_object_that_fits(product):
-    scene = product(noise=0.0)
-    analysis = analyze(scene.image, scene.white, scene.body, scene.mask)
-    error = analysis.predicted_error(scene.body)
-    assert error.shape == scene.mask.shape
-    assert error.dtype == np.float32
-    assert (error >= 0).all()
-    assert error.max() < 0.2
-    assert (error[scene.mask == 0] == 0).all()
-
-
-def test_predicted_error_grows_with_what_the_model_does_not_explain(product):
-    scene = product(noise=0.0)
-    image = scene.image.copy()
-    normal = np.cross(scene.body, scene.white)
-    image[:, :30] += (0.02 * normal / np.linalg.norm(normal)).astype(np.float32)
-    analysis = analyze(image, scene.white, scene.body, scene.mask, "dichromatic")
-    error = analysis.predicted_error((0.05, 0.1, 0.4))
-    inside = scene.mask == 1
-    spoiled, sound = inside.copy(), inside.copy()
-    spoiled[:, 30:], sound[:, :31] = False, False
-    assert np.median(error[spoiled]) > 1
-    assert np.median(error[spoiled]) > 5 * np.median(error[sound])
-
-
-def test_predicted_error_is_the_difference_between_keeping_and_dropping_the_residual(product):
-    scene = product(noise=0.0, gloss=0.0)
-    image = scene.image.copy()
-    image[..., 2] *= 1.5
-    analysis = analyze(image, reference=scene.body, mask=scene.mask, model="dichromatic")
-    target = (0.1, 0.3, 0.2)
-    kept, dropped = (
-        colour.XYZ_to_Lab(analysis.recolor(target, residual=rule) @ SRGB.to_xyz.T, (0.3127, 0.3290))
-        for rule in ("keep", "drop")
-    )
-    expected = colour.delta_E(kept, dropped, method="CIE 2000")
-    inside = scene.mask == 1
-    predicted = analysis.predicted_error(target)[inside]
-    assert np.median(expected[inside]) > 1
-    # The rest is the noise term, which is small on a clean scene.
-    assert (predicted >= expected[inside] - 1e-2).all()
-    np.testing.assert_allclose(predicted, expected[inside], atol=0.3)
-
-
-def test_predicted_error_grows_with_noise_and_with_strength_of_the_change(product):
-    errors = {}
-    for noise in (0.002, 0.01):
-        scene = product(noise=noise)
-        analysis = analyze(scene.image, scene.white, scene.body, scene.mask)
-        for name, target in (("near", scene.body * 1.05), ("far", np.array([0.02, 0.05, 0.7]))):
-            errors[noise, name] = float(np.median(analysis.predicted_error(target)[scene.mask == 1]))
-    assert errors[0.01, "far"] > 2 * errors[0.002, "far"]
-    assert errors[0.01, "far"] > 2 * errors[0.01, "near"]

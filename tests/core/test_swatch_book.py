@@ -1,6 +1,8 @@
 """The book: what is built in, what the user adds, and what is remembered."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -141,3 +143,16 @@ def test_swatches_of_files_as_targets(tmp_path):
     ):
         with pytest.raises(TargetError, match=said):
             parse_target(text, tmp_path)
+
+
+def test_tables_are_read_when_they_are_needed():
+    code = """
+from dyehouse.core import metamerism, spectra, swatch_book
+book = swatch_book.Book()
+assert len(book.names) == 8
+assert swatch_book.parse_target("#1F4E79").written == "#1F4E79"
+assert spectra._tables.cache_info().currsize == 0
+assert len(book.library("ColorChecker")) == 24
+assert spectra._tables.cache_info().currsize == 1
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -136,6 +136,16 @@ def idle():
     return not any(window.modal_operators for window in bpy.context.window_manager.windows) and redrawn()
 
 
+def settle():
+    """Wait until the extension has nothing more to compute and the editors show it; `yield from` it."""
+    from bl_ext.user_default.dyehouse.addon import background
+
+    quiet = 0
+    while quiet < 3:  # what is done in a thread may begin the next thing when it is drawn
+        yield redrawn
+        quiet = 0 if background.busy() else quiet + 1
+
+
 # --- windows, editors, pictures ---
 
 

@@ -57,6 +57,12 @@ def test_ase_of_another_writer(tmp_path):
     np.testing.assert_allclose(by_profile.named("Ink").to_lab(), (80, 90, 100), atol=1e-6)
 
 
+def test_short_floats_are_what_they_stand_for():
+    again = swatch_files.parse(swatch_files.encode(LIBRARY, ".ase")[0], ".ase", "x")
+    assert again.swatches[0].written == "#C0392B"
+    assert again.swatches[1].written == "lab(42, 55, -35 / D50)"
+
+
 def test_a_file_of_inks_alone_is_refused_with_the_reason(tmp_path):
     independent.write(
         [{"name": "K", "type": "Spot", "data": {"mode": "CMYK", "values": [0.0, 0.0, 0.0, 1.0]}}], tmp_path / "k.ase"

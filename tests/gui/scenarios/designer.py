@@ -5,14 +5,9 @@ import json
 import bpy
 import gui_kit as gui
 import numpy as np
-from bl_ext.user_default.dyehouse.addon import background
 
 SAUCER, COFFEE, CARD = (120, 250), (272, 151), (395, 90)
 TARGETS = {"Petrol": "#1F5E66", "Sand": "#C8B48C", "Black": "#1E1E20"}
-
-
-def _settled():
-    return gui.redrawn() and not background.busy()
 
 
 def _open(area, name):
@@ -47,8 +42,7 @@ def _seen(area, region, image):
     """The whole picture as the screen shows it, nothing over it."""
     yield from gui.sidebar(area, None)
     gui.move(region.x + 5, region.y + 5)
-    yield _settled
-    yield _settled
+    yield from gui.settle()
     seen = gui.picture(region, image)
     yield from gui.sidebar(area, "Dyehouse")
     return seen
@@ -68,8 +62,7 @@ def a_product_is_recolored_with_the_mouse():
 
     def dimmed(x, y):
         gui.move(region.x + 5, region.y + 5)  # so that the loupe is out of the way
-        yield _settled
-        yield _settled
+        yield from gui.settle()
         shown = gui.screen()[gui.place(*gui.at(region, image, x, y))]
         return np.abs(shown - codes[y, x]).max() > 8
 
@@ -93,7 +86,7 @@ def a_product_is_recolored_with_the_mouse():
     yield from gui.press(area, "dyehouse.pick_reference")
     yield gui.redrawn
     gui.move(*gui.at(region, image, *SAUCER))
-    yield _settled
+    yield from gui.settle()
     gui.figure("blender-loupe", area)
     yield from gui.click(*gui.at(region, image, *SAUCER))
     yield gui.idle
@@ -108,7 +101,7 @@ def a_product_is_recolored_with_the_mouse():
     # Live: the screen follows the color while the button is still down, and nothing is written.
     yield from gui.scroll_up(area)
     yield from gui.press(area, "dyehouse.preview")
-    yield _settled
+    yield from gui.settle()
     before, color_before = (yield from _seen(area, region, image)), tuple(product.target.color)
     assert np.abs(before.astype(int) - codes).max() > 50, "the preview shows nothing"
     x, y = yield from gui.find(area, "target.color", across=0.7)
@@ -123,7 +116,7 @@ def a_product_is_recolored_with_the_mouse():
         shown.append(gui.screen()[gui.place(*gui.at(region, image, *SAUCER))])
 
     yield from gui.drag(wheel, (wheel[0] - 30, wheel[1] - 20), (wheel[0] - 25, wheel[1] + 35), between=midway)
-    gui.move(region.x + 5, region.y + 5)  # away from the picker: it closes
+    gui.key("Return")  # closes the picker, and makes the drag one step to undo
     yield gui.idle
     color = tuple(product.target.color)
     assert np.abs(np.subtract(color, color_before)).max() > 0.05, "the drag did not change the color"
@@ -137,13 +130,13 @@ def a_product_is_recolored_with_the_mouse():
     # Undo and redo bring back the color and the preview.
     gui.move(*gui.at(region, image, *SAUCER))
     gui.key("ctrl+z")
-    yield _settled
+    yield from gui.settle()
     image = bpy.data.images["photo.png"]
     assert tuple(image.dyehouse.regions[0].target.color) == color_before, "undo"
     assert (yield from _seen(area, region, image)).tolist() == before.tolist(), "the preview after undo"
     gui.move(*gui.at(region, image, *SAUCER))
     gui.key("ctrl+shift+z")
-    yield _settled
+    yield from gui.settle()
     image = bpy.data.images["photo.png"]
     assert tuple(image.dyehouse.regions[0].target.color) == color, "redo"
     assert (yield from _seen(area, region, image)).tolist() == after.tolist(), "the preview after redo"
@@ -160,7 +153,7 @@ def a_product_is_recolored_with_the_mouse():
         gui.key("ctrl+a")
         gui.write(text)
         gui.key("Return")
-        yield _settled
+        yield from gui.settle()
     settings.output_pattern = str(gui.folder / "{photo}-{colorway}.png")
     yield from gui.press(area, "dyehouse.write_colorways")
     yield lambda: all((gui.folder / f"photo-{name}.png").exists() for name in TARGETS)

@@ -1,0 +1,267 @@
+"""How far a recolor will be from the truth, before any pixel is touched.
+
+The error of a pixel is made up of ways in which it can depart from the model. Each is a small change of the pixel
+that is followed through the recolor matrix and seen as a color difference, so that it counts the more, the farther
+the target is and the worse body and surface can be told apart:
+
+==========  ================================================================================================
+noise       the photo's noise in each channel, and the steps of its codes
+reference   the same in the reference color, for all pixels alike
+residual    what the model does not explain of the pixel: as much may have gone unseen into body and gloss
+body        1 % more or less body reflection
+hue         1 % of the light in a direction that is neither body nor white
+grain       gloss that changes from pixel to pixel: fibers of another color look the same
+lights      the difference from the plain model, where that of two lights has taken over
+gray        gloss that is lost in the body, where noise hides it: an ordinary 2 % of the white
+==========  ================================================================================================
+
+They are added as squares. Their weights, and the factors of the bounds, are fitted on half of the laboratory's cases
+and tested on the others by ``python -m dyehouse.benchmarks.calibration``, which prints them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import dichromatic
+from .colorimetry import delta_e_2000, linear_to_lab
+from .colorspace import LINEAR_SRGB
+from .mixture import Mixture
+from .picture import Picture
+from .stability import Noise
+
+# Fitted: `uv run --group bench python -m dyehouse.benchmarks.calibration --fit`.
+WEIGHTS: Mapping[str, float] = {
+    "noise": 0.95,
+    "reference": 0.46,
+    "residual": 0.39,
+    "body": 0.7,
+    "hue": 0.14,
+    "grain": 0.23,
+    "lights": 0.3,
+    "gray": 0.16,
+}
+
+# 90 % of pixels are below this times their own predicted error; and below this times the 90th percentile of their
+# region's.
+PIXEL_BOUND, REGION_BOUND = 2.9, 2.0
+
+# Predicted median from which a recolor is flagged; and median difference from the plain model from which one is that
+# takes the product for metal or sees two lights.
+FLAG, FLAG_MODEL = 2.0, 5.0
+
+_REMEDIES: Mapping[str, str] = {
+    "noise": "the photo is too noisy or too dark for so large a change: use a longer exposure or a lower ISO",
+    "reference": "the reference is dark or noisy: click a better lit part",
+    "residual": "the product shows colors that the model does not explain: select one material, or check a sample",
+    "body": "the change is large: check the result against a sample",
+    "hue": "the change is large: check the result against a sample",
+    "grain": "fibers, a print or wear of another color look like gloss: select one material, or check a sample",
+    "lights": "light of more than one color falls on the product: photograph it in one light",
+    "gray": "the product is almost the color of the light, so highlights and body cannot be told apart: mask the "
+    "highlights out, or photograph a colored sample",
+}
+
+# Noise gain from which a product counts as almost gray.
+_GRAY_GAIN = 6.0
+
+# Change of the light, for "body" and "hue".
+_SMALL = 0.01
+
+# Gloss of an ordinary surface away from its highlights, as a share of the white, for "gray".
+_USUAL_GLOSS = 0.02
+
+# Sine of the angle to the white under which there is no plane of body and white.
+_FLAT = 1e-3
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What to expect of a region's recolor.
+
+    Attributes
+    ----------
+    median
+        CIEDE2000 that half of the pixels are expected to stay below.
+    bound90
+        CIEDE2000 that 90 % of the pixels are expected to stay below.
+    flagged
+        Whether the color will probably be visibly wrong.
+    warnings
+        Sentences for the user, each with a remedy.
+    """
+
+    median: float
+    bound90: float
+    flagged: bool
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Doubt:
+    """All that the prediction for one target is made from.
+
+    Attributes
+    ----------
+    picture
+        The photo.
+    extra
+        (height, width, n) corrections, or None.
+    mixture
+        The model.
+    matrix
+        (3, 3 + n) of the recolor.
+    target
+        (3,) V'.
+    target_white
+        (3,) W'.
+    noise
+        Of the color, relative to the white.
+    noise_gain
+        Of the split into body and gloss.
+    split_noise
+        Noise of the gloss, relative to the light.
+    """
+
+    picture: Picture
+    extra: NDArray | None
+    mixture: Mixture
+    matrix: NDArray[np.float64]
+    target: NDArray[np.float64]
+    target_white: NDArray[np.float64]
+    noise: Noise
+    noise_gain: float
+    split_noise: float = 0.0
+
+    @cached_property
+    def _axes(self) -> tuple[NDArray, NDArray, NDArray]:
+        """Of the white-balanced light: body, in its plane with the white across it, and across both; unit vectors."""
+        body = self.mixture.body / self.mixture.white
+        body = body / np.linalg.norm(body)
+        gray = np.full(3, 3**-0.5)
+        toward = gray - (gray @ body) * body
+        if np.linalg.norm(toward) < _FLAT:
+            toward = np.cross(body, np.eye(3)[np.argmin(np.abs(body))])
+        toward = toward / np.linalg.norm(toward)
+        return body, toward, np.cross(body, toward)
+
+    @property
+    def _colored(self) -> bool:
+        return bool(dichromatic.sine(self.mixture.body, self.mixture.white) > _FLAT)
+
+    def parts(self, rows: NDArray, columns: NDArray) -> dict[str, NDArray[np.float64]]:
+        """(n,) CIEDE2000 at n pixels, of every way to depart from the model; names as in `WEIGHTS`."""
+        white, matrix = self.mixture.white, self.matrix[:, :3]
+        pixels = self.picture.at(rows, columns).astype(np.float64)
+        given = self._given(pixels, rows, columns)
+        result = given @ self.matrix.T
+        seen = self._lab(result)
+
+        def through(change: NDArray) -> NDArray[np.float64]:
+            """What a change of the white-balanced pixel does to the color."""
+            return delta_e_2000(self._lab(result + (change * white) @ matrix.T), seen)
+
+        def beyond(change: NDArray) -> NDArray[np.float64]:
+            """The same, if the change shall stay what it is."""
+            return delta_e_2000(self._lab(result + (change * white) @ (matrix - np.eye(3)).T), seen)
+
+        body, toward, normal = self._axes
+        light = (pixels / white) @ body
+        color = self.mixture.body / white
+        sigma = np.hypot(self.noise.at(light)[:, None], self._step(pixels) / white)
+        wrong = np.hypot(self.noise.at(color @ body), self._step(self.mixture.body[None])[0] / white)
+        strength = (light / (color @ body))[:, None]
+        left = np.linalg.norm((given @ self.mixture.left_over.T) / white, axis=1, keepdims=True)
+        found = {
+            "noise": np.sqrt(sum(through(sigma * axis) ** 2 for axis in np.eye(3))),
+            "reference": np.sqrt(sum(through(strength * wrong * axis) ** 2 for axis in np.eye(3))),
+            "residual": beyond(left * toward),
+            "body": through(_SMALL * pixels / white),
+            "hue": beyond(_SMALL * light[:, None] * normal),
+        }
+        lost = _USUAL_GLOSS * (self.target_white - matrix @ white)
+        hidden = min(1.0, self.split_noise) if self._colored else 1.0
+        found["gray"] = hidden * delta_e_2000(self._lab(result + lost), seen)
+        found |= {"grain": np.zeros(len(rows)), "lights": np.zeros(len(rows))}
+        if self._colored and self.noise_gain < _GRAY_GAIN:
+            found["grain"] = delta_e_2000(self._lab(result + self._grain(rows, columns) * self.target_white), seen)
+        if self.mixture.model == "lights":
+            found["lights"] = self.disagreement(rows, columns)
+        return found
+
+    def disagreement(self, rows: NDArray, columns: NDArray) -> NDArray[np.float64]:
+        """(n,) CIEDE2000 between the model and the plain one; 0 where the plain one is of no use."""
+        if not self._colored or self.noise_gain >= _GRAY_GAIN:
+            return np.zeros(len(rows))
+        pixels = self.picture.at(rows, columns).astype(np.float64)
+        plain = dichromatic.recolor_matrix(self.mixture.body, self.target, self.mixture.white, self.target_white)
+        return delta_e_2000(self._lab(pixels @ plain.T), self._lab(self._given(pixels, rows, columns) @ self.matrix.T))
+
+    def predict(self, rows: NDArray, columns: NDArray) -> Prediction:
+        """What to expect of the region that these pixels are a sample of."""
+        parts = self.parts(rows, columns)
+        errors = _together(parts, WEIGHTS)
+        median, bound = float(np.median(errors)), REGION_BOUND * float(np.quantile(errors, 0.9))
+        overruled = self.mixture.model in ("metal", "lights") and (
+            float(np.median(self.disagreement(rows, columns))) > FLAG_MODEL
+        )
+        said = []
+        if median > FLAG:
+            worst = max(parts, key=lambda name: WEIGHTS[name] * float(np.median(parts[name])))
+            said.append(
+                f"The color will probably be off by about {median:.1f} CIEDE2000 (90 % of the product within "
+                f"{bound:.0f}): {_REMEDIES[worst]}."
+            )
+        elif overruled:
+            what = "metal" if self.mixture.model == "metal" else "lit by two lights"
+            said.append(
+                f"The result depends on whether the product is really {what}: compare the model 'dichromatic', or check "
+                "a sample."
+            )
+        return Prediction(median, bound, bool(said), tuple(said))
+
+    def errors(self, rows: NDArray, columns: NDArray, weights: Mapping[str, float] = WEIGHTS) -> NDArray[np.float64]:
+        """(n,) predicted CIEDE2000 at n pixels."""
+        return _together(self.parts(rows, columns), weights)
+
+    def _given(self, pixels: NDArray, rows: NDArray, columns: NDArray) -> NDArray[np.float64]:
+        """(n, 3 + m) pixels with their corrections."""
+        return pixels if self.extra is None else np.hstack([pixels, self.extra[rows, columns].astype(np.float64)])
+
+    def _step(self, pixels: NDArray) -> NDArray[np.float64]:
+        """(n, 3) linear light of one code; 0 for pictures of floats."""
+        stored = self.picture.pixels.dtype
+        if stored.kind == "f":
+            return np.zeros_like(pixels)
+        codes = np.asarray(self.picture.curve.encode(np.clip(pixels, 0, 1)), np.float64)
+        return np.asarray(self.picture.curve.decode(codes + 1 / np.iinfo(stored).max), np.float64) - np.clip(
+            pixels, 0, 1
+        )
+
+    def _lab(self, pixels: NDArray) -> NDArray:
+        # In white-balanced Rec.709 whatever the photo's primaries: it is an estimate.
+        return linear_to_lab(pixels / self.target_white, LINEAR_SRGB)
+
+    def _grain(self, rows: NDArray, columns: NDArray) -> NDArray[np.float64]:
+        """(n, 1) gloss of pixels beyond that of their neighborhood."""
+        height, width = self.picture.shape
+        white = self.mixture.white
+        split = dichromatic.projector(self.mixture.body, white)
+
+        def coefficients(down: int, right: int) -> NDArray:
+            at = np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)
+            return self.picture.at(*at).astype(np.float64) @ split.T
+
+        here = coefficients(0, 0)
+        around = sum(coefficients(*shift) for shift in ((-1, 0), (1, 0), (0, -1), (0, 1))) / 4
+        share = around[:, 1] / np.maximum(around[:, 0], 1e-3)
+        return np.abs(here[:, 1] - share * np.maximum(here[:, 0], 0))[:, None]
+
+
+def _together(parts: Mapping[str, NDArray[np.float64]], weights: Mapping[str, float]) -> NDArray[np.float64]:
+    return np.sqrt(np.sum([(weights[name] * part) ** 2 for name, part in parts.items()], axis=0))
