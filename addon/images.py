@@ -8,6 +8,7 @@ then they hold the file's codes.
 import os
 import tempfile
 import time
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, lru_cache, partial
@@ -79,9 +80,11 @@ def shape_of(image: bpy.types.Image) -> tuple[int, int]:
     if not width or not height:
         if image.type == "RENDER_RESULT":
             raise ImageError(f"'{name}' is empty: render in a window first, or open the rendered file.")
-        path = bpy.path.abspath(image.filepath, library=image.library)
-        if image.filepath and not Path(path).exists():
-            raise ImageError(f"Image '{name}' has lost its file '{path}': find it with File > External Data.")
+        wanted = bpy.path.abspath(image.filepath, library=image.library)
+        if image.filepath and not Path(wanted).exists():
+            raise ImageError(f"Image '{name}' has lost its file '{wanted}': find it with File > External Data.")
+        if path is not None:
+            raise ImageError(f"'{path}' is damaged or of a kind that Blender cannot read: copy or export it again.")
         raise ImageError(f"Image '{name}' has no pixels: render or load it first.")
     return height, width
 
@@ -172,10 +175,9 @@ def _fingerprint(image: bpy.types.Image, hurry: bool) -> int:
     again, found = _fingerprints.get(image.session_uid, (0.0, 0))
     if hurry and begun < again:
         return found
-    words = np.zeros(-(-len(image.pixels) // 2) * 2, np.float32)
-    image.pixels.foreach_get(words[: len(image.pixels)])
-    bits = words.view(np.uint64)
-    found = int(np.bitwise_xor.reduce(bits)) ^ int(bits.sum(dtype=np.uint64)) if len(bits) else 0
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    found = zlib.crc32(pixels)
     ended = time.monotonic()
     _fingerprints[image.session_uid] = (ended + max(0.3, 20 * (ended - begun)), found)
     return found
@@ -254,17 +256,18 @@ def set_pixels(image: bpy.types.Image, pixels: "NDArray") -> None:
     image.update_tag()  # or the compositor goes on with the old pixels
 
 
-def _held(image: bpy.types.Image) -> "tuple[NDArray, str, bool, bool]":
-    """Pixels that Blender alone holds, what they mean to it, whether they are linear, and multiplied by alpha."""
+def _held(image: bpy.types.Image) -> "tuple[NDArray, str, bool, bool, bool]":
+    """Pixels that Blender alone holds, what they mean to it, and whether they are bytes, linear, times alpha."""
+    meaning, pixels = image.colorspace_settings.name, pixels_of(image)
+    linear = image.is_float and meaning != "Non-Color"
+    return pixels, meaning, not image.is_float, linear, linear and image.alpha_mode in {"STRAIGHT", "PREMUL"}
+
+
+def _stored(pixels: "NDArray[np.float32]", byte: bool) -> "NDArray":
+    """Codes of a byte image, which Blender gives divided by 255; other pixels as they are."""
     import numpy as np
 
-    pixels = pixels_of(image)
-    meaning = image.colorspace_settings.name
-    if not image.is_float:
-        return np.floor(pixels * 255 + 0.5).astype(np.uint8), meaning, False, False
-    if meaning == "Non-Color":
-        return pixels, meaning, False, False
-    return pixels, meaning, True, image.alpha_mode in {"STRAIGHT", "PREMUL"}
+    return (pixels * 255 + 0.5).astype(np.uint8) if byte else pixels
 
 
 def _decoded(path: Path) -> "Decoded":
@@ -318,6 +321,7 @@ def _integers(pixels: "NDArray", is_float: bool) -> "NDArray":
 def _photo(
     pixels: "NDArray",
     meaning: str,
+    byte: bool,
     linear: bool,
     premultiplied: bool,
     name: str | None,
@@ -327,6 +331,7 @@ def _photo(
     from ..batch.files import Photo
     from ..core.colorspace import SRGB, space_named
 
+    pixels = _stored(pixels, byte)
     if linear:
         space = working
     else:
@@ -396,8 +401,8 @@ def coverage_loader(image: bpy.types.Image, shape: tuple[int, int]) -> "Callable
     path = file_of(image)
     if path is not None:
         return mask_file_loader(path, shape)
-    pixels, *_ = _held(image)
-    return partial(files.coverage, pixels, shape, f"The mask '{image.name}'")
+    (pixels, _, byte, *_), name = _held(image), f"The mask '{image.name}'"
+    return lambda: files.coverage(_stored(pixels, byte), shape, name)
 
 
 def mask_file_loader(path: Path, shape: tuple[int, int]) -> "Callable[[], NDArray]":

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 import gpu
+from bpy.app.handlers import persistent
 
 from . import background, drawing, images, session
 
@@ -49,7 +50,7 @@ _FRAGMENT = """
 vec4 layer(int k) {
     if (nearest) {
         // The editor looks up its own pixels at the lower left corner of those of the screen (measured).
-        vec2 corner = max(uv - 0.5 * (dFdx(uv) + dFdy(uv)), 0.0);
+        vec2 corner = max(uv - 0.499 * (dFdx(uv) + dFdy(uv)), 0.0);
         return texelFetch(layers, ivec3(ivec2(corner * vec2(textureSize(layers, 0).xy)), k), 0);
     }
     return texture(layers, vec3(uv, float(k)));
@@ -510,11 +511,30 @@ def _draw_notes() -> None:
             now.look.prepared.regions()
         except DyehouseError as error:
             note = str(error)
+    if now is not None and image.dyehouse.preview and image.dyehouse.view == "SPLIT":
+        _draw_line(bpy.context.region, image.dyehouse.split)
     if note:
         drawing.note(drawing.scaled(12), drawing.scaled(12), textwrap.wrap(note, _LETTERS))
 
 
+def _draw_line(region: bpy.types.Region, split: float) -> None:
+    (x, bottom), (_, top) = (region.view2d.view_to_region(split, y, clip=False) for y in (0, 1))
+    width = drawing.scaled(1)
+    drawing.box(x - width, bottom, 2 * width, top - bottom, (0, 0, 0, 0.6))
+    drawing.box(x - width / 2, bottom, width, top - bottom, (1, 1, 1, 0.8))
+
+
 _handles: list[object] = []
+
+
+@persistent
+def _on_load(_path: str) -> None:
+    _forget()
+
+
+def _forget() -> None:
+    for kept in (_last, _textures, _in_use, _resting, selecting, _canvas):
+        kept.clear()
 
 
 def register() -> None:
@@ -523,6 +543,7 @@ def register() -> None:
     _handles.append(add(_find_canvas, (), "WINDOW", "PRE_VIEW"))
     _handles.append(add(_draw, (), "WINDOW", "POST_VIEW"))
     _handles.append(add(_draw_notes, (), "WINDOW", "POST_PIXEL"))
+    bpy.app.handlers.load_post.append(_on_load)
 
 
 def unregister() -> None:
@@ -532,7 +553,7 @@ def unregister() -> None:
         bpy.types.SpaceImageEditor.draw_handler_remove(_handles.pop(), "WINDOW")
     if bpy.app.timers.is_registered(background.redraw):
         bpy.app.timers.unregister(background.redraw)
-    for kept in (_last, _textures, _in_use, _resting, selecting, _canvas):
-        kept.clear()
+    bpy.app.handlers.load_post.remove(_on_load)
+    _forget()
     _shader = None
     background.redraw()

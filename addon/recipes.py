@@ -11,7 +11,7 @@ from .properties import NOWHERE
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from ..core.colorspace import RGBSpace
     from ..core.recipe import Colorway, Recipe, Region
@@ -313,7 +313,7 @@ def in_photo_space(color: "NDArray | bpy.types.bpy_prop_array", image: bpy.types
     return tuple(float(v) for v in between(images.working_space(), session.space_of(image), color))
 
 
-def in_working_space(color: "NDArray", image: bpy.types.Image) -> tuple[float, ...]:
+def in_working_space(color: "ArrayLike", image: bpy.types.Image) -> tuple[float, ...]:
     """The way back: linear RGB of the photo as Blender's color buttons show it."""
     from . import session
 

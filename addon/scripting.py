@@ -145,21 +145,18 @@ def look_at(image: bpy.types.Image, **asked: Any) -> session.Look:
 
 def recipe_of(image: bpy.types.Image, **asked: Any) -> "tuple[Recipe, dict[str, masks.Source]]":
     """The recipe of arguments, and its masks by the names that they have in it; parameters as for :func:`recolor`."""
-    from ..batch.cli import REGION_KEYS, parser, recipe_from
+    from ..batch.cli import parser, recipe_from
     from ..core.errors import RecipeError
     from ..core.recipe import with_target
 
-    usual = vars(parser().parse_args(["inspect", "photo"]))
+    usual = {k: v for k, v in vars(parser().parse_args(["inspect", "photo"])).items() if k not in _NO_RECIPE}
     unknown = asked.keys() - usual.keys() - {"regions"}
     if unknown:
-        raise RecipeError(f"'{min(unknown)}' is not understood: use {', '.join(REGION_KEYS)} or a light's option.")
+        raise RecipeError(f"'{min(unknown)}' is not understood: use regions, {', '.join(sorted(usual))}.")
     regions = [_region_of(image, region) for region in asked.pop("regions", ()) or ()]
     common_part, sources, swatch = _region_of(image, asked)
     given = {key: value for key, value in common_part.items() if value not in (None, "")}
-    lines = [
-        " ".join(f"{key}={_quoted(value)}" for key, value in texts.items() if value not in (None, ""))
-        for texts, *_ in regions
-    ]
+    lines = [" ".join(_written(key, value) for key, value in texts.items()) for texts, *_ in regions]
     recipe = recipe_from(Namespace(**usual | given | {"region": lines}))
     for _, more, _ in regions:
         sources |= more
@@ -167,6 +164,10 @@ def recipe_of(image: bpy.types.Image, **asked: Any) -> "tuple[Recipe, dict[str, 
     if regions or swatch:
         recipe = with_target(recipe, *(swatches or [swatch]))
     return recipe, sources
+
+
+# Options of the command line that are no part of what is asked of a photo.
+_NO_RECIPE = {"command", "photo", "run", "json", "maps", "force", "recipe", "colorway", "region", "color_space"}
 
 
 def _image(image: Image) -> bpy.types.Image:
@@ -208,10 +209,11 @@ def _path(text: Any, image: bpy.types.Image) -> Any:
     return str(common.absolute(text, image.library)) if isinstance(text, str) and text.startswith("//") else text
 
 
-def _quoted(value: Any) -> str:
+def _written(key: str, value: Any) -> str:
+    """A key of a region as the command line has it; nothing for what is not given."""
     import shlex
 
-    return shlex.quote(str(value))
+    return "" if value in (None, "", False) else f"{key}={'yes' if value is True else shlex.quote(str(value))}"
 
 
 def _mask_of(image: bpy.types.Image, mask: "bpy.types.ID | NDArray | str | Path") -> tuple[str, masks.Source]:

@@ -47,7 +47,9 @@ def _made(image: bpy.types.Image) -> "list[NDArray] | None":
         if look is None or not look.prepared.recipe.colorways:
             return None
         proxy = _proxies.ask(look.key, lambda: lambda: _small(look))
-        return proxy and _pictures.ask((look.key, look.prepared.recipe), lambda: lambda: _all(proxy, look))
+        if proxy is None:
+            return None
+        return _pictures.ask((look.key, look.prepared.recipe), lambda: lambda: _all(proxy, look))
     except DyehouseError:  # the panel says it elsewhere
         return None
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import bpy
 
@@ -113,7 +113,7 @@ def begin(
     """
     from ..batch import photo as photos
 
-    options = {"force": overwrite, "quality": quality, "compression": compression}
+    options: dict[str, Any] = {"force": overwrite, "quality": quality, "compression": compression}
     if images.reads_files():
         _, shares = photos.save(photo, prepared, path, watch=watch, **options)
         return lambda: shares

@@ -26,6 +26,9 @@ from .journal import Journal
 
 JOURNAL, PAGE = "dyehouse-journal.jsonl", "index.html"
 
+# Seconds between lines of progress where there is no terminal.
+_TELL_EVERY = 10.0
+
 # Free bytes under which the disk counts as full.
 _FULL = 1 << 20
 
@@ -257,6 +260,13 @@ def command_line(options: argparse.Namespace) -> int:
         raise FileError(f"--per-task {options.per_task} is too few: give 1 or more.")
     if options.max_error is not None and not options.max_error >= 0:
         raise FileError(f"--max-error {options.max_error} is no color difference: give 0 or more, such as 2.")
+    try:
+        import OpenImageIO  # noqa: F401
+    except ImportError:
+        raise FileError(
+            "A catalog needs OpenImageIO, which this Python does not have: use a Blender that has it, or pip install "
+            "dyehouse."
+        ) from None
     if options.resume and options.force:
         raise FileError("--resume and --force contradict each other: give one of them.")
     jobs, problems = gather(options.tables, options.recipe)
@@ -308,7 +318,7 @@ def _watched(run: Run, options: argparse.Namespace) -> int:
     finally:
         if handled:
             for number, handler in before.items():
-                signal.signal(number, handler)
+                signal.signal(number, handler or signal.SIG_DFL)  # None: it was not Python's, as in Blender
     if interrupted:
         run.stopped = "stopped: go on with --resume"
     summary = run.summary | {"seconds": round(time.perf_counter() - started, 1)}
@@ -335,7 +345,7 @@ def _in_words(summary: dict[str, Any], *, page: bool) -> str:
 
 @contextlib.contextmanager
 def _progress(run: Run, options: argparse.Namespace) -> Iterator[Any]:
-    """Show how far the run is: a bar, plain lines where there is no rich, JSON, or nothing."""
+    """Show how far the run is: a bar, plain lines where there is no terminal or no rich, JSON, or nothing."""
     if options.json:
         yield lambda entry: print(json.dumps(entry, ensure_ascii=False), flush=True)
         return
@@ -343,13 +353,18 @@ def _progress(run: Run, options: argparse.Namespace) -> Iterator[Any]:
         yield lambda entry: None
         return
     try:
+        from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
     except ImportError:
         yield _PlainProgress(run.total)
         return
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _PlainProgress(run.total)
+        return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     rate = TextColumn("{task.fields[rate]}")
-    with Progress(*columns, rate, TimeRemainingColumn(), transient=True) as bar:
+    with Progress(*columns, rate, TimeRemainingColumn(), console=console, transient=True) as bar:
         started = time.perf_counter()
         task = bar.add_task("Recoloring", total=run.total, rate="")
 
@@ -361,7 +376,7 @@ def _progress(run: Run, options: argparse.Namespace) -> Iterator[Any]:
 
 
 class _PlainProgress:
-    """A line every few seconds."""
+    """A line now and then."""
 
     def __init__(self, total: int) -> None:
         self.total, self.done = total, 0
@@ -370,7 +385,7 @@ class _PlainProgress:
     def __call__(self, _: dict[str, Any]) -> None:
         self.done += 1
         now = time.perf_counter()
-        if now - self.told > 5 or self.done == self.total:
+        if now - self.told > _TELL_EVERY:
             rate = self.done / (now - self.started)
             left = (self.total - self.done) / rate
             print(f"{self.done} of {self.total}, {rate:.1f} a second, {left:.0f} s left", file=sys.stderr, flush=True)

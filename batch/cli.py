@@ -34,7 +34,8 @@ examples:
     dyehouse inspect shirt.jpg --click 640,820 --target "#1F4E79" --maps maps/
 
 Colors: #RRGGBB, lab(L,a,b), lch(L,C,h), xyz(X,Y,Z), xyy(x,y,Y), each with its white if need be, as in
-lab(42,55,35 / D65); rgb(r,g,b), linear in the photo's space; or a CSV file of wavelength, reflectance.
+lab(42,55,35 / D65); rgb(r,g,b), linear in the photo's space; a CSV file of wavelength, reflectance;
+or a swatch of a file or a built-in library, as season.ase#Navy or CSS#teal.
 Pixels are x,y from the top left."""
 
 

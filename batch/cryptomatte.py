@@ -91,8 +91,8 @@ def _names(source: Any, path: str | Path) -> dict[str, dict[str, str]]:
     if not layers:
         raise FileError(f"'{path}' has no cryptomatte: render it with a Cryptomatte pass into a multilayer EXR.")
     try:
-        return {layer: json.loads(manifest) for layer, manifest in layers.items()}
-    except (TypeError, ValueError):
+        return {layer: json.loads(manifest or "") for layer, manifest in layers.items()}
+    except ValueError:
         raise FileError(f"'{path}' does not list the names of its cryptomatte: render it with them inside.") from None
 
 

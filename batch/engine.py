@@ -144,7 +144,7 @@ def processes(workers: int, threads: int, begin: Callable[..., None], *arguments
         # A fork of a process with threads may hang; a fork server is as fast as a fork and has none.
         context = multiprocessing.get_context("forkserver" if os.name == "posix" else "spawn")
         if os.name == "posix":
-            context.set_forkserver_preload(["dyehouse.batch.work"])
+            context.set_forkserver_preload([f"{__package__}.work"])
         return ProcessPoolExecutor(workers, context, _begin, (threads, begin, arguments))
 
     return make

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import re
 import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -23,6 +25,9 @@ TABLES = (".csv", ".tsv", ".jsonl", ".ndjson")
 
 # Bytes of a name that every file system takes.
 _LONGEST = 255
+
+# Names that surely can be, so that a hundred thousand of them are checked in no time.
+_PLAIN = re.compile(rf"[\w# -][\w#. -]*({'|'.join(map(re.escape, files.OUTPUT_KINDS))})", re.ASCII | re.IGNORECASE)
 
 # Where contact sheets go, and results that need a person.
 SHEETS, ASIDE = "sheets", "needs-a-person"
@@ -134,7 +139,7 @@ class Gathering:
         if stored.photo is None:
             self.problems.append(Problem(source, "no photo is named: give one under 'photo'."))
             return
-        asked = stored.photo if storage.is_url(stored.photo) else str(stored.folder / stored.photo)
+        asked = stored.photo if storage.is_url(stored.photo) else os.path.join(stored.folder, stored.photo)  # noqa: PTH118
         photos = self._globs.get(asked)
         if photos is None:
             try:
@@ -185,7 +190,9 @@ class Gathering:
     def _sound(self, want: Want, first: dict[str, Want]) -> bool:
         problem = output_problem(want.output)
         # Names that differ in case or in how accents are composed are one file on some systems.
-        key = unicodedata.normalize("NFC", want.output).casefold()
+        key = want.output.lower()
+        if not key.isascii():
+            key = unicodedata.normalize("NFC", want.output).casefold()
         if not problem and key in first:
             other = first[key]
             problem = (
@@ -201,6 +208,8 @@ class Gathering:
 
 def output_problem(output: str) -> str:
     """Why a result cannot have this name, in words; empty if it can."""
+    if len(output) <= _LONGEST and _PLAIN.fullmatch(output):
+        return ""
     path = PurePosixPath(output.replace("\\", "/"))
     if path.is_absolute() or ".." in path.parts or ":" in output or "\0" in output:
         return f"'{output}' lies outside the output folder: give a name below it."

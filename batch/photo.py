@@ -54,7 +54,7 @@ def upright(photo: files.Photo, prepared: Prepared) -> tuple[files.Photo, Prepar
     if photo.orientation == 1:
         return photo, prepared
     pairs = zip(prepared.recipe.regions, prepared.analyses, strict=True)
-    masks = {region.mask: analysis.selection for region, analysis in pairs if isinstance(region.mask, str)}
+    masks = {r.mask: a.selection for r, a in pairs if isinstance(r.mask, str) and a.selection is not None}
     turned = replace(photo, pixels=files.turned(photo.pixels, photo.orientation), orientation=1)
     recipe = turned_recipe(prepared.recipe, photo.pixels.shape, photo.orientation)
     return turned, look(turned, recipe, read_mask=lambda name: files.turned(masks[name], photo.orientation))

@@ -1,9 +1,9 @@
 """Was the asked color delivered? The written file is read back and its product compared with the swatch.
 
-What is compared is the product's matte color, as the method has it: pixels of the photo whose body reflection is about
-that of the reference and which hold almost no gloss. In the file each is divided by its share A of body reflection,
-after its gloss B has been taken away, and the trimmed mean of all is set against the color that the reference shall
-have. The photo decides which pixels these are, so the area is chosen before the photo's pixels are spent.
+What is compared is the product's matte color, as the method has it: the pixels of the photo that are most like the
+reference, whatever light falls on them. In the file each is divided by its share A of body reflection, after what gloss
+B it has was taken away, and the trimmed mean of all is set against the color that the reference shall have. The photo
+decides which pixels these are, so the area is chosen before the photo's pixels are spent.
 """
 
 from __future__ import annotations

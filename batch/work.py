@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..core.errors import DyehouseError, FileError
 from ..core.recipe import Colorway, Prepared
 from ..core.thumbnail import proxy_of, thumbnail
-from . import files, inspection, journal, photo, sheet, storage
+from . import files, inspection, journal, photo, sheet, storage, verification
 from .jobs import ASIDE, Job, Want
 
 # Greatest and least width of a picture on a contact sheet, and pictures in a row.
@@ -208,6 +208,7 @@ def _written(task: Task, want: Want, opened: files.Photo, own: Prepared, out: ND
     reason = _gate(task, own, error)
     file = f"{ASIDE}/{want.output}" if reason else want.output
     place = _place(task.out, file)
+    expected = verification.expect(opened, own)
     with storage.arriving(place) as local:
         written, shares = photo.save(
             opened,
@@ -220,6 +221,7 @@ def _written(task: Task, want: Want, opened: files.Photo, own: Prepared, out: ND
             threads=task.threads,
         )
         digest = storage.digest(written)
+        delivered = [check.as_dict() for check in expected.check(written)]
     _remove_other(task, want, file)
     entry = _entry(task.job, want, "needs a person" if reason else "done")
     return entry | {
@@ -228,6 +230,7 @@ def _written(task: Task, want: Want, opened: files.Photo, own: Prepared, out: ND
         "sha256": digest,
         "model": [analysis.model for analysis in own.analyses],
         "predicted_error": error,
+        "verification": delivered,
         "warnings": inspection.with_shares({"warnings": own.warnings}, shares)["warnings"],
         "notes": list(opened.assumptions),
         "reason": reason,

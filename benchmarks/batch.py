@@ -137,7 +137,9 @@ def run_color_matcher(folder: Path, count: int) -> None:
             shutil.copy(path, source)
         program = Path(sys.executable).with_name("color-matcher")
         command = [str(program), "-s", str(source), "-r", str(folder / "photo0000.jpg"), "-m", "mkl"]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        subprocess.run(command, check=False, cwd=place, capture_output=True)  # its exit code is 1 whatever happens
+        if len(list(Path(place).glob("batch_proc_mkl/*"))) != count:
+            raise SystemExit("color-matcher did not write all its files")
 
 
 # --- memory ---------------------------------------------------------------------------------------------------

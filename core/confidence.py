@@ -37,23 +37,23 @@ from .stability import Noise
 
 # Fitted: `uv run --group bench python -m dyehouse.benchmarks.calibration --fit`.
 WEIGHTS: Mapping[str, float] = {
-    "noise": 0.95,
-    "reference": 0.46,
-    "residual": 0.39,
+    "noise": 1.0,
+    "reference": 0.35,
+    "residual": 0.41,
     "body": 0.7,
-    "hue": 0.14,
-    "grain": 0.23,
-    "lights": 0.3,
-    "gray": 0.16,
+    "hue": 0.16,
+    "grain": 0.22,
+    "lights": 0.23,
+    "gray": 0.15,
 }
 
 # 90 % of pixels are below this times their own predicted error; and below this times the 90th percentile of their
 # region's.
-PIXEL_BOUND, REGION_BOUND = 2.9, 2.0
+PIXEL_BOUND, REGION_BOUND = 3.1, 2.3
 
 # Predicted median from which a recolor is flagged; and median difference from the plain model from which one is that
 # takes the product for metal or sees two lights.
-FLAG, FLAG_MODEL = 2.0, 5.0
+FLAG, FLAG_MODEL = 2.25, 4.0
 
 _REMEDIES: Mapping[str, str] = {
     "noise": "the photo is too noisy or too dark for so large a change: use a longer exposure or a lower ISO",
@@ -178,8 +178,8 @@ class Doubt:
         strength = (light / (color @ body))[:, None]
         left = np.linalg.norm((given @ self.mixture.left_over.T) / white, axis=1, keepdims=True)
         found = {
-            "noise": np.sqrt(sum(through(sigma * axis) ** 2 for axis in np.eye(3))),
-            "reference": np.sqrt(sum(through(strength * wrong * axis) ** 2 for axis in np.eye(3))),
+            "noise": np.sqrt(np.sum([through(sigma * axis) ** 2 for axis in np.eye(3)], axis=0)),
+            "reference": np.sqrt(np.sum([through(strength * wrong * axis) ** 2 for axis in np.eye(3)], axis=0)),
             "residual": beyond(left * toward),
             "body": through(_SMALL * pixels / white),
             "hue": beyond(_SMALL * light[:, None] * normal),
@@ -220,8 +220,8 @@ class Doubt:
         elif overruled:
             what = "metal" if self.mixture.model == "metal" else "lit by two lights"
             said.append(
-                f"The result depends on whether the product is really {what}: compare the model 'dichromatic', or check "
-                "a sample."
+                f"The result depends on whether the product is really {what}: compare the model 'dichromatic', or "
+                "check a sample."
             )
         return Prediction(median, bound, bool(said), tuple(said))
 
@@ -258,7 +258,7 @@ class Doubt:
             return self.picture.at(*at).astype(np.float64) @ split.T
 
         here = coefficients(0, 0)
-        around = sum(coefficients(*shift) for shift in ((-1, 0), (1, 0), (0, -1), (0, 1))) / 4
+        around = np.mean([coefficients(*shift) for shift in ((-1, 0), (1, 0), (0, -1), (0, 1))], axis=0)
         share = around[:, 1] / np.maximum(around[:, 0], 1e-3)
         return np.abs(here[:, 1] - share * np.maximum(here[:, 0], 0))[:, None]
 

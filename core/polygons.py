@@ -123,7 +123,7 @@ def fill(polygons: Sequence[ArrayLike], shape: tuple[int, int], rule: str = "uni
     np.add.at(change, (row, column), way * (_FINE - fine))
     np.add.at(change, (row, column + 1), way * fine)
     np.cumsum(change, axis=1, out=change)
-    return change[:, :width] / np.float32(_LINES * _FINE)
+    return change[:, :width].astype(np.float32) / np.float32(_LINES * _FINE)
 
 
 def _crossings(polygons: Sequence[ArrayLike], height: int) -> tuple[NDArray, NDArray, NDArray, NDArray]:

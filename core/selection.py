@@ -21,7 +21,7 @@ from .separation import MODEL_ERROR, NO_GLOSS, USUAL_BOUNCE, frame, split
 from .stability import Noise
 
 # Pixels that are looked at, for the models and for the noise.
-_SAMPLE, _ROWS = 12_000, 60_000
+_SAMPLE, _ROWS = 8_000, 25_000
 
 # Light under which a pixel tells nothing, against the reference.
 _DARK = 0.08
@@ -29,6 +29,9 @@ _DARK = 0.08
 # Share of pixels up to which a model explains a region; that from which one does not, and a richer one is looked for;
 # and that from which the light itself is in doubt.
 _FEW, _BROKEN, _LIT_OTHERWISE = 0.02, 0.035, 0.06
+
+# Residual, as a share of pixels, from which light of another color is looked for: on products that shine, that do not.
+_OTHER_LIGHT = (0.2, 0.1)
 
 # Pixels without which nothing can be counted; half the side of the window that steadies a noisy reference.
 _FEWEST, _WINDOW = 100, 3
@@ -59,7 +62,7 @@ _GRAY, _LITTLE = 1e-3, 1 / 6
 _MOST_BOUNCE = 1.2
 
 # Noise of the split into body and gloss, relative to the light, from which it is smoothed.
-_NOISY = 0.015
+_NOISY = 0.02
 
 # Of two lights: log color ratio of a warmer light to a colder. For narrow bands the logarithm of a black body is
 # linear in 1 / T (Finlayson & Hordley 2001, "Color constancy at a pixel"); this is tungsten against daylight.
@@ -155,29 +158,38 @@ def choose(
         dull = figures["highlights"] < _SHINY and seen.clipped < _FEWEST_CLIPPED
         matte = dull and figures["matte_unexplained"] < max(_FEW, broken / 3)
         glossy = figures["glossy_unexplained"] < max(_FEW, broken / 8) and figures["bounce"] < _MOST_BOUNCE
+    found: Mixture | None
     if matte and not noisy:
         found = mixture.matte_bounce(body, white, feedback)
     elif matte or glossy or model == "bounce":
         found = mixture.mapped("bounce", steady, white, feedback if matte else interreflection.USUAL, gloss=not matte)
     elif model == "lights" or (model == "auto" and broken > _LIT_OTHERWISE and _is_smooth(picture, seen, mask, noise)):
         found = _lit(seen, body, white, figures, model)
-    elif noisy or model == "regularized":
-        found = mixture.mapped("regularized", steady, white)
     else:
+        found = None
+    if found is None and (noisy or model == "regularized"):
+        found = mixture.mapped("regularized", steady, white)
+    elif found is None:
         found = mixture.plain("dichromatic", body, white)
     below = max(NO_GLOSS, -figures["least_gloss"]) if found.model == "regularized" else NO_GLOSS
     return Evidence(found, noise, below, figures)
 
 
-def _lit(seen: _Seen, body: NDArray, white: NDArray, figures: dict[str, float], model: str) -> Mixture:
-    """Two lights, if the region shines and they explain it; else a gain by channel, right where nothing shines."""
+def _lit(seen: _Seen, body: NDArray, white: NDArray, figures: dict[str, float], model: str) -> Mixture | None:
+    """A model for what gloss and bounce do not explain; None if it is not the light either.
+
+    Two lights, if the product shines and they do explain it. Without highlights a gain by channel is right for any
+    light, and for metal; but a fold whose bounce is only half explained is a fold.
+    """
     light, figures["lights_unexplained"] = _lights(seen)
-    explained = figures["residual"] > _LIT_OTHERWISE > figures["lights_unexplained"]
-    if model == "lights" or (figures["highlights"] > _FEW and explained):
+    if model == "lights":
         return mixture.two_lights(body, white, light)
-    if figures["highlights"] <= _FEW or figures["residual"] > _LIT_OTHERWISE:
+    if figures["highlights"] > _FEW:
+        explained = figures["residual"] > _OTHER_LIGHT[0] and figures["lights_unexplained"] < _LIT_OTHERWISE
+        return mixture.two_lights(body, white, light) if explained else None
+    if figures["residual"] > _OTHER_LIGHT[1] or figures["bounce"] > _MOST_BOUNCE:
         return mixture.metal(body, white)
-    return mixture.plain("dichromatic", body, white)
+    return mixture.mapped("bounce", body, white, interreflection.USUAL)
 
 
 # --- What is looked at --------------------------------------------------------------------------------------
@@ -196,10 +208,10 @@ def noise_across(picture: Picture, body: NDArray, white: NDArray) -> Noise:
     fine = (np.abs(linear) < min(picture.clip_level, _HUGE)).all(axis=2) & (linear > 0).any(axis=2)
     axes = frame(body / white)
     basis = (np.vstack([axes.along, axes.across]) / white).astype(np.float32)
-    light, *across = np.moveaxis(linear @ basis.T, -1, 0)
+    axial = linear @ basis.T
     fine = fine[:, 2:] & fine[:, 1:-1] & fine[:, :-2]
-    bright = ((light[:, 2:] + light[:, :-2]) / 2)[fine]
-    second = np.stack([np.abs(y[:, 2:] - 2 * y[:, 1:-1] + y[:, :-2])[fine] for y in across], axis=1)
+    bright = (axial[:, 2:, 0] + axial[:, :-2, 0])[fine] / 2
+    second = np.abs(axial[:, 2:, 1:] - 2 * axial[:, 1:-1, 1:] + axial[:, :-2, 1:])[fine]
     rows, variances, weights = [], [], []
     for low, high in itertools.pairwise(_BRIGHTNESS):
         chosen = (bright > low) & (bright <= high)

@@ -1,5 +1,7 @@
 """The list of colorways: named sets of targets for the regions of a photo."""
 
+from typing import Any
+
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
@@ -22,7 +24,7 @@ class _ColorwayOperator(common.RegionOperator):
             return False
         return super().poll(context)
 
-    def found(self, context: bpy.types.Context) -> tuple[object, int]:
+    def found(self, context: bpy.types.Context) -> tuple[Any, int]:
         """The settings of the image, and the index of the colorway."""
         from ...core.errors import RecipeError
 

@@ -13,7 +13,7 @@ from . import common
 from .regions import free_name
 
 if TYPE_CHECKING:
-    from ...core.recipe import Recipe
+    from ...core.recipe import Recipe, Region
     from ...core.recipe_file import Output, StoredRecipe
 
 
@@ -155,7 +155,8 @@ def _with_mask_files(
     """The recipe with masks in files: where they are in one, that one, else a new one beside the recipe."""
     from ...batch.files import turned
 
-    regions, written = [], []
+    regions: list[Region] = []
+    written: list[Path] = []
     sources, shape, orientation = masks.sources(image), images.shape_of(image), images.orientation_of(image)
     for region in recipe.regions:
         source = sources.get(region.mask) if isinstance(region.mask, str) else None

@@ -319,6 +319,10 @@ class DYEHOUSE_OT_recolor_texture(TextureArguments, bpy.types.Operator):
         self.warn(prepared)
 
 
+def _in_compositor(context: bpy.types.Context) -> bool:
+    return getattr(context.space_data, "tree_type", "") == nodes.TREES["COMPOSITOR"]
+
+
 class DYEHOUSE_OT_remove_recolor(MaterialOperator, bpy.types.Operator):
     """Take the recolor node out again, so that the texture or the render has its own color"""
 
@@ -334,6 +338,11 @@ class DYEHOUSE_OT_remove_recolor(MaterialOperator, bpy.types.Operator):
         description="Name of the scene whose compositor is meant; empty for a material",
         options={"SKIP_SAVE"},
     )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """As for materials; in the compositor there is always a scene."""
+        return _in_compositor(context) or super().poll(context)
 
     @common.reporting
     def execute(self, context: bpy.types.Context) -> None:
@@ -351,9 +360,7 @@ class DYEHOUSE_OT_remove_recolor(MaterialOperator, bpy.types.Operator):
             nodes.remove(node)
 
     def _owner(self, context: bpy.types.Context) -> tuple[bpy.types.ID, bpy.types.NodeTree | None]:
-        if not self.scene and (
-            self.material or getattr(context.space_data, "tree_type", "") != nodes.TREES["COMPOSITOR"]
-        ):
+        if not self.scene and (self.material or not _in_compositor(context)):
             material = self.found_material(context)
             return material, material.node_tree
         scene = found_scene(context, self.scene)

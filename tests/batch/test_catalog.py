@@ -1,5 +1,6 @@
 """`dyehouse batch` on real files: the same pixels as one photo at a time, and what goes wrong without stopping it."""
 
+import contextlib
 import json
 import os
 import re
@@ -138,8 +139,27 @@ def test_without_sheets(run, shop, tmp_path):
 
 def test_progress_without_rich(run, shop, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rich.progress", None)
+    monkeypatch.setattr("dyehouse.batch.catalog._TELL_EVERY", 0.0)
     _, _, err = run(shop, "--out", tmp_path / "out")
+    assert re.search(r"1 of 6, [\d.]+ a second, \d+ s left", err)
     assert re.search(r"6 of 6, [\d.]+ a second, 0 s left", err)
+
+
+def test_progress_on_a_terminal(shop, tmp_path):
+    ours, theirs = os.openpty()
+    command = [sys.executable, "-m", "dyehouse", "batch", str(shop), "--out", str(tmp_path / "out"), "--workers", "0"]
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "120"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, text=True, env=environment) as process:
+        os.close(theirs)
+        shown = b""
+        with contextlib.suppress(OSError):  # how a terminal says that the other end is closed
+            while part := os.read(ours, 4096):
+                shown += part
+        said = process.stdout.read()
+    os.close(ours)
+    assert process.returncode == 0
+    assert said.startswith("6 done")
+    assert re.search(rb"Recoloring.*6/6.* a second.*0:00", shown, re.DOTALL)
 
 
 # --- check ----------------------------------------------------------------------------------------------------

@@ -6,10 +6,13 @@ import pytest
 from PIL import Image
 
 from dyehouse.batch import files, photo, verification
+from dyehouse.batch.cli import main
 from dyehouse.core.colorspace import SPACES
 from dyehouse.core.errors import DyehouseError, FileError
 from dyehouse.core.recipe import Recipe, Region
 from dyehouse.core.swatches import parse_target
+
+from .catalogs import catalog, journal_of
 
 NAVY, TEAL = parse_target("#1F4E79"), parse_target("lab(50, -30, -5)")
 D65 = np.array([0.3127, 0.3290])
@@ -152,3 +155,12 @@ def test_a_color_outside_the_file_says_how_near_it_can_come(product, opened, tmp
         else:
             assert found.limit == 0
             assert found.ciede2000 < 0.5
+
+
+def test_the_journal_of_a_catalog_tells_what_was_delivered(tmp_path, product):
+    table = catalog(tmp_path / "shop", product, count=1)
+    assert main(["batch", str(table), "--out", str(tmp_path / "out"), "--workers", "1", "--quiet"]) == 0
+    entries = journal_of(tmp_path / "out")
+    delivered = [check for entry in entries for check in entry.get("verification", [])]
+    assert {check["target"] for check in delivered} == {"#1F4E79", "#2E6B3A"}
+    assert all(check["ciede2000"] < 1 for check in delivered)

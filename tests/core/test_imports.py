@@ -51,7 +51,17 @@ prepare(Picture(image), recipe).regions()
     assert imported(code) == {"dyehouse", "numpy"}
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["recolor", "--help"], ["inspect", "--help"], ["--version"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--help"],
+        ["recolor", "--help"],
+        ["inspect", "--help"],
+        ["verify", "--help"],
+        ["swatches", "--help"],
+        ["--version"],
+    ],
+)
 def test_help_imports_neither_numpy_nor_openimageio(arguments):
     code = f"""
 from dyehouse.batch.cli import main

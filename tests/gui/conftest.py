@@ -138,7 +138,7 @@ class Blender:
             f"gui_kit.run({str(file)!r}, {str(folder)!r}, {scenarios!r})\n"
         )
         arguments = ["--no-window-focus", "--window-geometry", "0", "0", "1600", "1000", "--python-expr", code]
-        done = self.run(*arguments, timeout=150 + 60 * len(scenarios))
+        done = self.run(*arguments, timeout=150 + 120 * len(scenarios))
         log = done.stdout + done.stderr
         (folder / "blender.log").write_text(log)
         outcome = Outcome(folder, log)

@@ -33,7 +33,7 @@ import bpy
 import numpy as np
 
 PAUSE = 0.05  # seconds between two events of one gesture: Blender reads the state of keys when it gets to them
-STEP = 30.0  # seconds after which a step has waited in vain, on a slow and busy machine
+STEP = 60.0  # seconds after which a step has waited in vain, on a slow and busy machine
 folder = Path()  # scratch folder of this run: photo.png is there, and results may be left there
 _frames = 0
 _mark = 0
@@ -47,7 +47,7 @@ def run(file, where, names):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     # A window that hangs in a call of Blender must end as well.
-    watchdog = threading.Timer(120.0 + 60.0 * len(names), _leave, ["no end in sight"])
+    watchdog = threading.Timer(120.0 + 120.0 * len(names), _leave, ["no end in sight"])
     watchdog.daemon = True
     watchdog.start()
     queue = [(name, getattr(module, name)) for name in names]
@@ -297,12 +297,17 @@ def find(area, name, across=0.6):
         if page:
             _xdo("click", "--repeat", 12, "--delay", 10, 5)  # the mouse wheel: the rest of a long sidebar
             yield redrawn
-        for y in range(ui.y + ui.height - 8, ui.y, -9):
+        remembered = [_found[name]] if name in _found and not page else []
+        for y in remembered + list(range(ui.y + ui.height - 8, ui.y, -16)):  # a button is 20 high
             move(x, y)
             yield PAUSE
             if _hovered(area, ui).endswith(name):
+                _found[name] = y
                 return x, y
     raise LookupError(f"no button {name} in the sidebar")
+
+
+_found = {}  # where a button was last time
 
 
 def scroll_up(area):

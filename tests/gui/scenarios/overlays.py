@@ -19,7 +19,7 @@ def every_overlay_shows_the_core_numbers():
     image = gui.load("photo.png")
     with_region(image).model = "dichromatic"
     image.dyehouse.overlay_opacity = 1.0
-    _, area, region = yield from gui.image_editor(image)
+    _, area, region = yield from gui.image_editor(image, zoom=2.0)
     yield from ready(image)
     analysis = session.look(image).prepared.analyses[0]
     prepared = session.look(image).prepared
@@ -46,7 +46,7 @@ def every_overlay_shows_the_core_numbers():
                     inside += 1
         assert inside > 30, inside
         assert difference <= 2, (kind, difference)
-        beside = gui.place(*gui.at(region, image, 500, 60))
+        beside = gui.place(*gui.at(region, image, 500, 120))
         assert np.abs(shown[beside].astype(int) - plain[beside]).max() <= 1, kind
 
 
