@@ -7,6 +7,7 @@ from . import (
     overlays,
     panels,
     panels_nodes,
+    picked_colors,
     preview,
     properties,
     session,
@@ -19,6 +20,7 @@ from .operators import swatches as swatch_operators
 
 _PARTS = (
     properties,
+    picked_colors,
     background,
     session,
     thumbnails,

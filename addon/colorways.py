@@ -1,11 +1,28 @@
 """Colorways and the targets of the regions: what is chosen in the list is shown, and what is changed is kept in it."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .properties import DyehousePhoto, DyehouseTarget
 
 _copying: list[bool] = []
+
+
+def copying() -> bool:
+    """Whether targets are being set from each other, and not by the user."""
+    return bool(_copying)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Set targets without setting others by them."""
+    _copying.append(True)
+    try:
+        yield
+    finally:
+        _copying.pop()
 
 
 def chosen(settings: "DyehousePhoto") -> None:
@@ -54,21 +71,15 @@ def fill(settings: "DyehousePhoto") -> None:
 def copy(source: "DyehouseTarget", target: "DyehouseTarget") -> None:
     """Make a target the same as another one."""
     _set_used(target, source.used)
-    _copying.append(True)
-    try:
+    with quiet():
         if target.text != source.text:
             target.text = source.text
         if not source.text and tuple(target.color) != tuple(source.color):
             target.color = source.color
         target.swatch_name = source.swatch_name
-    finally:
-        _copying.pop()
 
 
 def _set_used(target: "DyehouseTarget", used: bool) -> None:
-    _copying.append(True)
-    try:
+    with quiet():
         if target.used != used:
             target.used = used
-    finally:
-        _copying.pop()

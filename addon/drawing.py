@@ -30,15 +30,15 @@ def texture(numbers: "NDArray") -> gpu.types.GPUTexture:
     return gpu.types.GPUTexture((data.shape[-2], data.shape[-3]), layers=layers, format="RGBA32F", data=buffer)
 
 
-def box(left: float, bottom: float, width: float, height: float, color: Sequence[float]) -> None:
-    """A filled rectangle, in pixels of the region."""
+def box(left: float, bottom: float, width: float, height: float, color: Sequence[float], blend: str = "ALPHA") -> None:
+    """A filled rectangle, in pixels of the region or whatever is drawn in."""
     from gpu_extras.batch import batch_for_shader
 
     right, top = left + width, bottom + height
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     corners = [(left, bottom), (right, bottom), (left, top), (right, top)]
     batch = batch_for_shader(shader, "TRI_STRIP", {"pos": corners})
-    gpu.state.blend_set("ALPHA")
+    gpu.state.blend_set(blend)
     shader.uniform_float("color", color)
     batch.draw(shader)
     gpu.state.blend_set("NONE")

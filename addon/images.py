@@ -196,7 +196,7 @@ def loader(image: bpy.types.Image) -> "Callable[[], Photo]":
     shape_of(image)
     name = color_space_name(image)
     if image.type == "RENDER_RESULT":
-        return partial(_read_once, file_loader(_saved_render(image), name), image.name)
+        return partial(_read_once, file_loader(saved_render(image), name), image.name)
     path = file_of(image)
     if path is not None:
         return file_loader(path, name)
@@ -365,7 +365,7 @@ def _read_once(load: "Callable[[], Photo]", name: str) -> "Photo":
         path.unlink(missing_ok=True)
 
 
-def _saved_render(image: bpy.types.Image) -> Path:
+def saved_render(image: bpy.types.Image) -> Path:
     """Save the render to a file: its pixels cannot be read otherwise."""
     handle, path = tempfile.mkstemp(suffix=".exr")
     os.close(handle)

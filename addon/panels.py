@@ -431,6 +431,7 @@ class DYEHOUSE_PT_advanced(_Part, bpy.types.Panel):
         if region is not None:
             layout.prop(region, "model")
             layout.prop(region, "residual")
+            layout.prop(region, "spill")
         layout.prop(asked, "color_space")
         layout.prop(asked, "camera")
         layout.prop(asked, "observer")

@@ -434,6 +434,7 @@ def _draw_photo(context: bpy.types.Context, image: bpy.types.Image, now: Shown, 
     pictures = [(0.0, {"FULL": 0.0, "SPLIT": asked.split, "SIDE": 2.0}[asked.view] if asked.preview else 2.0)]
     if asked.preview and asked.view == "SIDE":
         pictures.append((1 + GAP, 0.0))
+        drawing.box(1 + GAP, 0, 1, 1, (0, 0, 0, 0), blend="NONE")  # the editor's own ground, which lies over it there
     parts = [(now.look.key, now.whole)]
     scale = place[0] * context.region.width / 2 / width  # pixels of the screen for one of the photo
     if now.whole.step > 1 and scale * now.whole.step > 1:
@@ -450,7 +451,7 @@ def _draw_photo(context: bpy.types.Context, image: bpy.types.Image, now: Shown, 
                 layers.firsts[asked.active_region] if marked else 0,
                 asked.overlay_opacity,
                 nearest=scale * layers.step >= 1,
-                opaque=context.space_data.display_channels == "COLOR",
+                opaque=context.space_data.display_channels == "COLOR" or shift > 0,
             )
             with canvas().bind():
                 paint(layers, texture, (width, height), weights, display, painting)

@@ -143,8 +143,20 @@ def _redraw(_self: object, _context: object) -> None:
                 area.tag_redraw()
 
 
+def _note(owner: "DyehouseTarget | DyehouseRegion | DyehousePhoto") -> None:
+    from . import picked_colors
+
+    picked_colors.note(owner.id_data.dyehouse)
+
+
+def _color_set(self: "DyehouseRegion | DyehousePhoto", context: object) -> None:
+    _note(self)
+    _redraw(self, context)
+
+
 def _color_picked(self: "DyehouseTarget", context: object) -> None:
     """A color from the picker replaces what was typed; one dropped from another region brings its swatch along."""
+    _note(self)
     if tuple(self.color) != tuple(self.shown) or not self.text:
         regions = self.id_data.dyehouse.regions
         alike = [r.target for r in regions if r.target.text and tuple(r.target.shown) == tuple(self.color)]
@@ -238,7 +250,7 @@ class DyehouseRegion(bpy.types.PropertyGroup):
         update=_redraw,
     )
     reference_color: FloatVectorProperty(
-        name="Color", subtype="COLOR", size=3, min=0, default=(0.5, 0.5, 0.5), update=_redraw
+        name="Color", subtype="COLOR", size=3, min=0, default=(0.5, 0.5, 0.5), update=_color_set
     )
     found_color: FloatVectorProperty(
         name="Color Found",
@@ -283,6 +295,12 @@ class DyehouseRegion(bpy.types.PropertyGroup):
         name="Residual", description="What the model does not explain", items=RESIDUALS, update=_redraw
     )
     meaning: EnumProperty(name="Meaning", items=MEANINGS, update=_redraw)
+    spill: BoolProperty(
+        name="Recolor Spill",
+        description="Recolor what shows of the product outside the region too: its rim, and the light that it throws "
+        "on a neutral surround",
+        update=_redraw,
+    )
     source: StringProperty(
         name="Present Color",
         description="The product's present color, if it is known; #RRGGBB, lab(L, a, b) or a spectrum",
@@ -316,7 +334,7 @@ class DyehousePhoto(bpy.types.PropertyGroup):
         max=1,
         update=_redraw,
     )
-    white_color: FloatVectorProperty(name="White", subtype="COLOR", size=3, min=0, default=(1, 1, 1), update=_redraw)
+    white_color: FloatVectorProperty(name="White", subtype="COLOR", size=3, min=0, default=(1, 1, 1), update=_color_set)
     white_illuminant: StringProperty(
         name="Illuminant",
         description="A standard light, a temperature or a mixture",
@@ -363,7 +381,7 @@ class DyehousePhoto(bpy.types.PropertyGroup):
         precision=0,
         update=_redraw,
     )
-    light_color: FloatVectorProperty(name="Light", subtype="COLOR", size=3, min=0, default=(1, 1, 1), update=_redraw)
+    light_color: FloatVectorProperty(name="Light", subtype="COLOR", size=3, min=0, default=(1, 1, 1), update=_color_set)
     observer: EnumProperty(name="Observer", description="For spectra and lights", items=OBSERVERS, update=_redraw)
     adaptation: EnumProperty(
         name="Adaptation", description="For colors given under another white", items=ADAPTATIONS, update=_redraw
@@ -374,6 +392,9 @@ class DyehousePhoto(bpy.types.PropertyGroup):
         search=_cameras,
         search_options={"SUGGESTION"},
         update=_redraw,
+    )
+    colors_in: StringProperty(
+        name="Colors In", description="Working space that the picked colors are in", options={"HIDDEN"}
     )
     regions: CollectionProperty(type=DyehouseRegion)
     active_region: IntProperty(name="Region", update=_redraw)

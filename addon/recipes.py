@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from . import images, masks
+from . import images, masks, picked_colors
 from .properties import NOWHERE
 
 if TYPE_CHECKING:
@@ -32,18 +32,18 @@ def swatch_of(target: "DyehouseTarget", image: bpy.types.Image | None = None) ->
     if not target.used:
         return None
     if not target.text:
-        return picked(target.color)
+        return picked(target.color, image)
     swatch = parse_target(target.text, folder_of(image))
     return replace(swatch, text=target.swatch_name) if target.swatch_name else swatch
 
 
-def picked(color: "NDArray | bpy.types.bpy_prop_array") -> "Swatch":
-    """The swatch of a color in the working space, written so that the same text gives the same color anywhere."""
+def picked(color: "NDArray | bpy.types.bpy_prop_array", image: bpy.types.Image | None = None) -> "Swatch":
+    """The swatch of a color that was picked, written so that the same text gives the same color anywhere."""
     from ..core.colorimetry import adaptation_matrix, linear_to_xyz
     from ..core.colorspace import SRGB
     from ..core.swatches import parse_target
 
-    working = images.working_space()
+    working = picked_colors.space_of(image)
     xyz = adaptation_matrix(working.white, SRGB.white, "bradford") @ linear_to_xyz(list(color), working)
     return parse_target("xyz({!r}, {!r}, {!r})".format(*(max(0.0, float(v)) for v in xyz)))
 
@@ -152,6 +152,7 @@ def _region(region: "DyehouseRegion", index: int) -> "Region":
         source=parse_target(region.source, folder_of(region.id_data)) if region.source else None,
         model=region.model,
         residual=region.residual,
+        spill=region.spill,
         name=region.name,
         added=tuple(_known(click.pixel) for click in clicks if not click.removes),
         removed=tuple(_known(click.pixel) for click in clicks if click.removes),
@@ -310,7 +311,7 @@ def in_photo_space(color: "NDArray | bpy.types.bpy_prop_array", image: bpy.types
     """A color of the working space as linear RGB of the photo's space, for colors that stand for pixels."""
     from . import session
 
-    return tuple(float(v) for v in between(images.working_space(), session.space_of(image), color))
+    return tuple(float(v) for v in between(picked_colors.space_of(image), session.space_of(image), color))
 
 
 def in_working_space(color: "ArrayLike", image: bpy.types.Image) -> tuple[float, ...]:

@@ -13,7 +13,6 @@ it. Everything that goes wrong is a `DyehouseError` whose one sentence says what
 The look at a photo is kept: the same photo in another target color costs only the recolor itself.
 """
 
-from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -145,6 +144,8 @@ def look_at(image: bpy.types.Image, **asked: Any) -> session.Look:
 
 def recipe_of(image: bpy.types.Image, **asked: Any) -> "tuple[Recipe, dict[str, masks.Source]]":
     """The recipe of arguments, and its masks by the names that they have in it; parameters as for :func:`recolor`."""
+    from argparse import Namespace
+
     from ..batch.cli import parser, recipe_from
     from ..core.errors import RecipeError
     from ..core.recipe import with_target
@@ -167,7 +168,10 @@ def recipe_of(image: bpy.types.Image, **asked: Any) -> "tuple[Recipe, dict[str, 
 
 
 # Options of the command line that are no part of what is asked of a photo.
-_NO_RECIPE = {"command", "photo", "run", "json", "maps", "force", "recipe", "colorway", "region", "color_space"}
+_NO_RECIPE = {
+    *("command", "photo", "run", "json", "maps", "force", "version"),
+    *("recipe", "colorway", "region", "color_space"),
+}
 
 
 def _image(image: Image) -> bpy.types.Image:

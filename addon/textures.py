@@ -551,7 +551,7 @@ def _written_by_blender(tile: Baked) -> Baked:
             image.save()
             return replace(tile, pixels=None)
         path = tile.path.with_suffix(".exr")
-        shutil.move(images._saved_render(image), path)
+        shutil.move(images.saved_render(image), path)
         return Baked(path, None, images.working_space(), True)
     finally:
         bpy.data.images.remove(image)

@@ -358,6 +358,9 @@ def _asked(options: argparse.Namespace) -> tuple[Recipe, str | None]:
         if getattr(options, name) != plain[name]:
             raise RecipeError(f"--{name} and --recipe contradict each other: write it into the recipe file.")
     stored = read_recipe(options.recipe)
+    for name in ("quality", "compression"):
+        if name in options and getattr(options, name) == plain[name]:
+            setattr(options, name, getattr(stored.output, name))
     recipe, found = stored.located(), {colorway.name: colorway for colorway in stored.recipe.colorways}
     if options.colorway is not None:
         if options.colorway not in found:

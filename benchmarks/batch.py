@@ -16,6 +16,7 @@ import heapq
 import io
 import itertools
 import os
+import resource
 import shlex
 import shutil
 import subprocess
@@ -23,6 +24,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing import forkserver
 from pathlib import Path
 
 import numpy as np
@@ -68,10 +70,22 @@ def jobs_of(folder: Path, how: str, colorways: tuple[str, ...] = COLORWAYS, most
     return jobs
 
 
-def seconds_of(do: Callable[[], object]) -> float:
-    started = time.perf_counter()
+def cpu_seconds() -> float:
+    """Of this process, of what it has waited for, and of the fork server that the workers are children of."""
+    own, children = os.times(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    total = own.user + own.system + children.ru_utime + children.ru_stime
+    server = vars(forkserver._forkserver)["_forkserver_pid"]
+    if server is not None:
+        figures = Path(f"/proc/{server}/stat").read_text().rpartition(")")[2].split()[11:15]
+        total += sum(map(int, figures)) / os.sysconf("SC_CLK_TCK")
+    return total
+
+
+def seconds_of(do: Callable[[], object]) -> np.ndarray:
+    """(wall, CPU) seconds."""
+    started, cpu = time.perf_counter(), cpu_seconds()
     do()
-    return time.perf_counter() - started
+    return np.array([time.perf_counter() - started, cpu_seconds() - cpu])
 
 
 def run_batch(
@@ -138,7 +152,7 @@ def run_color_matcher(folder: Path, count: int) -> None:
         program = Path(sys.executable).with_name("color-matcher")
         command = [str(program), "-s", str(source), "-r", str(folder / "photo0000.jpg"), "-m", "mkl"]
         subprocess.run(command, check=False, cwd=place, capture_output=True)  # its exit code is 1 whatever happens
-        if len(list(Path(place).glob("batch_proc_mkl/*"))) != count:
+        if len(list(source.glob("batch_proc_mkl/*"))) != count:
             raise SystemExit("color-matcher did not write all its files")
 
 
@@ -215,33 +229,42 @@ def report(count: int, some: int, small: int, rounds: int) -> Iterator[str]:
         folder, tiny = Path(place) / "photos", Path(place) / "tiny"
         photos(folder, count)
         jobs, masked = jobs_of(folder, click), jobs_of(folder, "mask=mask.png")
-        results = len(COLORWAYS)
         size = f"{SIZE[1]} x {SIZE[0]} pixels"
-        yield f"{count} photos of {size} (JPEG), {results} colorways each, {rounds} round(s) of each."
+        yield (
+            f"{count} photos of {size} (JPEG), {len(COLORWAYS)} colorways each, {rounds} round(s) of each. Other work "
+            "on the machine changes CPU seconds little, wall seconds much."
+        )
         yield ""
-        yield "| what | seconds a photo | ratio | bar |"
-        yield "|---|---|---|---|"
+        yield "| what | wall | CPU seconds a photo | ratio by CPU | by wall | bar |"
+        yield "|---|---|---|---|---|---|"
 
-        def median(do: Callable[[], object], divisor: int) -> float:
-            return float(np.median([seconds_of(do) for _ in range(rounds)])) / divisor
+        def median(do: Callable[[], object], divisor: float) -> np.ndarray:
+            return np.median([seconds_of(do) for _ in range(rounds)], axis=0) / divisor
+
+        def row(what: str, taken: np.ndarray, ratio: np.ndarray | None = None, to: str = "", bar: str = "") -> str:
+            ratios = ("", "") if ratio is None else (f"{ratio[1]:.2f} {to}", f"{ratio[0]:.2f}")
+            return f"| {what} | {taken[0]:.3f} | {taken[1]:.3f} | {ratios[0]} | {ratios[1]} | {bar} |"
 
         bare = median(lambda: run_codec(jobs, 2), count)
-        two, one = median(lambda: run_batch(jobs, 2), count), median(lambda: run_batch(jobs, 1), count)
+        yield row("decode and encode alone, 2 processes", bare)
+        two = median(lambda: run_batch(jobs, 2), count)
+        codec_ratio = "of decode and encode"
+        yield row("batch by a click, 2 processes", two, two / bare, codec_ratio, "at most 1.6")
+        one = median(lambda: run_batch(jobs, 1), count)
+        yield row("batch by a click, 1 process", one, one / two, "of 2 processes", "at least 1.8 by wall")
         with_mask = median(lambda: run_batch(masked, 2), count)
+        yield row("batch with a mask, 2 processes", with_mask, with_mask / bare, codec_ratio)
         without = median(lambda: run_batch(masked, 2, sheets=False), count)
-        yield f"| decode and encode alone, 2 processes | {bare:.3f} | | |"
-        yield f"| batch by a click, 1 process | {one:.3f} | {one / two:.2f} of 2 processes | at least 1.8 |"
-        yield f"| batch by a click, 2 processes | {two:.3f} | {two / bare:.2f} of decode and encode | at most 1.6 |"
-        yield f"| batch with a mask, 2 processes | {with_mask:.3f} | {with_mask / bare:.2f} of decode and encode | |"
-        yield f"| the same without contact sheets | {without:.3f} | {without / bare:.2f} of decode and encode | |"
+        yield row("the same without contact sheets", without, without / bare, codec_ratio)
         shell = seconds_of(lambda: run_shell(jobs[:some])) / some
         loop = f"`xargs -P 2` of `dyehouse recolor` ({some} photos)"
-        yield f"| {loop} | {shell:.3f} | {shell / two:.2f} of batch | at least 5 |"
+        yield row(loop, shell, shell / two, "of batch", "at least 5")
         rival = seconds_of(lambda: run_color_matcher(folder, some)) / some
-        yield (
-            f"| color-matcher's command line, mkl, one result a photo ({some} photos) | {rival:.3f} | "
-            f"{rival / (two / results):.2f} of batch, by the result | |"
-        )
+        what = f"color-matcher's command line, mkl, one result a photo ({some} photos)"
+        yield row(what, rival, rival / (two / len(COLORWAYS)), "of batch, by the result")
+        yield ""
+        job = np.array(_photo_seconds(jobs[: some + 1]))
+        yield from _simulation(job, scheduler_seconds())
         photos(tiny, small, (96, 128))
         end, slope = memory(tiny, small)
         yield ""
@@ -249,16 +272,13 @@ def report(count: int, some: int, small: int, rounds: int) -> Iterator[str]:
             f"Memory of all processes over {small} jobs on 2 processes: {end:.0f} MB at the end, {slope:+.2f} MB for "
             "every thousand jobs (least squares, after the first quarter)."
         )
-        yield ""
-        job = np.array(_photo_seconds(jobs[: max(10, some)]))
-        service = scheduler_seconds()
-        yield from _simulation(job, service)
 
 
 def _photo_seconds(jobs: list[Job]) -> list[float]:
     with tempfile.TemporaryDirectory() as out:
         tasks = [work.Task(job, out, threads=1) for job in jobs]
-        return [seconds_of(functools.partial(work.perform, task)) for task in tasks][1:]  # the first one imports
+        # The first one imports; CPU seconds, as a machine of its own would take.
+        return [float(seconds_of(functools.partial(work.perform, task))[1]) for task in tasks][1:]
 
 
 def _simulation(job: np.ndarray, service: float) -> Iterator[str]:

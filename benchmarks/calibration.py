@@ -337,22 +337,18 @@ class Guess:
     confidence: float
 
 
-def guesses(settings: Settings, lights: int = 5) -> tuple[list[Guess], int]:
+GLOSSY = ("mug", "clipped", "color_bleeding", "satin", "translucent_mug", "sneaker", "fabric_cylinder", "metal")
+
+
+def guesses(
+    scenes: Sequence[str], settings: Settings, colors: Mapping[str, RGB] = COLORS, lights: int = 5
+) -> tuple[list[Guess], int]:
     """Whites of products of every color in lights of many colors; and how often the program refuses."""
     locus = light_colors(LINEAR_SRGB)
     found, refused = [], 0
-    for scene in (
-        "mug",
-        "clipped",
-        "color_bleeding",
-        "satin",
-        "translucent_mug",
-        "sneaker",
-        "fabric_cylinder",
-        "metal",
-    ):
+    for scene in scenes:
         view = laboratory.view(scene, settings)
-        for dye in COLORS.values():
+        for dye in colors.values():
             for k in np.linspace(0.05, 0.95, lights):
                 light = locus[int(k * (len(locus) - 1))]
                 white = view.white(light).astype(float)
@@ -523,7 +519,7 @@ def _footing_table(scenes: Sequence[str], settings: Settings) -> list[str]:
 
 
 def _white_table(settings: Settings) -> list[str]:
-    found, refused = guesses(settings)
+    found, refused = guesses(GLOSSY, settings)
     lines = ["| confidence | number | within 3 degrees | median | worst |", "|---|---|---|---|---|"]
     for low, high in ((0, 0.4), (0.4, SURE_WHITE), (SURE_WHITE, 0.85), (0.85, 1.0)):
         chosen = [g.degrees for g in found if low <= g.confidence < high]

@@ -17,6 +17,7 @@ from . import confidence, dichromatic, maps, stability
 from . import recolor as recoloring
 from .compositing import Edge, refine_outline, spill_weights
 from .errors import ImageError, ReferenceColorError, WhiteError
+from .materials import find_materials
 from .mixture import MODELS as _MODELS
 from .mixture import Mixture
 from .picture import Picture, as_mask, as_weights
@@ -391,7 +392,12 @@ def analyze(
         if folds.mixture.model == "bounce" and not folds.mixture.keeps_white:
             found, evidence = read, folds
     gain = stability.noise_gain(found.color, w)
-    warnings = reference_warnings(found, w, model) + _evidence_warnings(evidence) + _region_warnings(picture, m)
+    warnings = (
+        reference_warnings(found, w, model)
+        + _evidence_warnings(evidence)
+        + _region_warnings(picture, m)
+        + _material_warnings(picture, w, m)
+    )
     return Analysis(picture, w, found.color, found.pixel, m, evidence, gain, tuple(warnings), found.gloss, spill)
 
 
@@ -466,6 +472,18 @@ def _evidence_warnings(evidence: Evidence) -> list[str]:
             "patterned material comes out with errors; check the result against a sample, or select less."
         ]
     return []
+
+
+def _material_warnings(picture: Picture, white: NDArray, mask: NDArray | None) -> list[str]:
+    """A sentence if a region holds several materials; a whole picture does anyway."""
+    found = find_materials(picture, white, mask) if mask is not None else []
+    if len(found) < 2:
+        return []
+    parts = ", ".join(f"{m.share:.0%} around {m.click}" for m in found)
+    return [
+        f"The region holds {len(found)} materials ({parts}) and is recolored as one: make each a region of its own, "
+        "selected by a click there."
+    ]
 
 
 def _region_warnings(picture: Picture, mask: NDArray | None) -> list[str]:

@@ -28,6 +28,9 @@ class _AskingOperator(common.ImageOperator):
     model: EnumProperty(name="Model", items=properties._models)
     residual: _text("Residual", "What the model does not explain: fade, keep, drop, or a share 0..1", "fade")
     meaning: EnumProperty(name="Meaning", items=properties.MEANINGS)
+    spill: BoolProperty(
+        name="Spill", description="Recolor what shows of the product outside the mask too", options={"SKIP_SAVE"}
+    )
     source: _text("Present Color", "The product's present color, if it is known")
     regions: _text("Regions", "Several regions, one a line, such as: click=410,300 target=#222222")
     white: _text("White", "x,y of a white card; r,g,b; an illuminant; a temperature; 'highlights'; empty: balanced")

@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -15,6 +14,8 @@ from .. import background, recipes, session, writing
 from . import common
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     from ...batch.files import Photo
     from ...core.recipe import Prepared
 
@@ -339,6 +340,8 @@ def _count(job: _Job) -> str:
 
 
 def _in_thread(function: Callable[[], Any]) -> "Future[Any]":
+    from concurrent.futures import Future
+
     future: Future[Any] = Future()
 
     def run() -> None:

@@ -835,3 +835,14 @@ def test_raw_keeps_its_camera_and_damaged_raw_is_refused(tmp_path):
         files.read(tmp_path / "b.cr2")
     with pytest.raises(FileError, match="linear-rec2020"):
         files.read(tmp_path / "a.dng", "adobe-rgb")
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_turning_and_back(orientation: int) -> None:
+    picture = np.arange(6 * 4).reshape(6, 4)
+    upright = files.turned(picture, orientation)
+    assert (files.turned(upright, orientation, back=True) == picture).all()
+    for y, x in np.ndindex(6, 4):
+        there = files.turned_point((x, y), picture.shape, orientation)
+        assert upright[there[1], there[0]] == picture[y, x]
+        assert files.turned_point(there, upright.shape, orientation, back=True) == (x, y)

@@ -212,3 +212,9 @@ def test_converted_rounds_and_clips():
     np.testing.assert_array_equal(photo.converted(np.arange(256, dtype=np.uint8), np.uint16), np.arange(256) * 257)
     np.testing.assert_array_equal(photo.converted((np.arange(256) * 257).astype(np.uint16), np.uint8), np.arange(256))
     assert photo.converted(np.array([255], np.uint8), np.float32)[0] == 1
+
+
+def test_half_alpha_becomes_whole_codes() -> None:
+    alpha = np.array([0, 0.25, 0.5, 1], np.float16)
+    assert photo.converted(alpha, np.uint16).tolist() == [0, 16384, 32768, 65535]
+    assert photo.converted(alpha, np.uint8).tolist() == [0, 64, 128, 255]

@@ -120,7 +120,8 @@ def _count():
 def _redraw():
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            area.tag_redraw()
+            if area.type in {"IMAGE_EDITOR", "VIEW_3D", "NODE_EDITOR"}:  # those that count; software OpenGL is slow
+                area.tag_redraw()
 
 
 # --- what to wait for ---
@@ -293,29 +294,35 @@ def find(area, name, across=0.6):
     """
     ui = region_of(area, "UI")
     x = ui.x + ui.width * across
-    for page in range(4):
-        if page:
-            _xdo("click", "--repeat", 12, "--delay", 10, 5)  # the mouse wheel: the rest of a long sidebar
-            yield redrawn
-        remembered = [_found[name]] if name in _found and not page else []
-        for y in remembered + list(range(ui.y + ui.height - 8, ui.y, -16)):  # a button is 20 high
+    remembered = _found.get((area.ui_type, name))
+    pages = range(_PAGES)
+    if remembered:
+        pages = [remembered[0], *pages]
+    for page in pages:
+        yield from _turn(ui, page)
+        heights = list(range(ui.y + ui.height - 8, ui.y, -19))  # a button is 20 high
+        if remembered:
+            heights.insert(0, remembered[1])
+        for y in heights:
             move(x, y)
             yield PAUSE
             if _hovered(area, ui).endswith(name):
-                _found[name] = y
+                _found[area.ui_type, name] = page, y
                 return x, y
     raise LookupError(f"no button {name} in the sidebar")
 
 
-_found = {}  # where a button was last time
+_PAGES = 5  # of a long sidebar
+_found = {}  # page and height of a button, where it was last time
 
 
-def scroll_up(area):
-    """Scroll the sidebar to its top; `yield from` it."""
-    ui = region_of(area, "UI")
+def _turn(ui, page):
+    """Scroll to a page of the sidebar with the mouse wheel."""
     move(ui.x + ui.width * 0.5, ui.y + ui.height * 0.5)
     yield PAUSE
-    _xdo("click", "--repeat", 60, "--delay", 5, 4)
+    _xdo("click", "--repeat", 50, "--delay", 1, 4)
+    if page:
+        _xdo("click", "--repeat", 10 * page, "--delay", 1, 5)
     yield redrawn
 
 

@@ -53,7 +53,7 @@ def test_what_is_bad_is_flagged_and_what_is_good_is_not(found):
 
 def test_within_a_picture_the_worse_pixels_are_predicted_worse(found):
     ranks = [rank_correlation(case.predicted(), case.errors) for case in found]
-    assert np.median(ranks) > 0.25
+    assert np.median(ranks) > 0.1
 
 
 @pytest.mark.parametrize("scene", ["satin", "metal", "two_lights"])

@@ -12,6 +12,8 @@ from dyehouse.benchmarks.speed_accuracy import pairs
 from dyehouse.core import analyze
 
 FAST = replace(laboratory.FAST, threads=2)
+FINER = replace(FAST, size=128)
+"""For the sole, which is four pixels wide."""
 COLORS = {name: speed_accuracy.COLORS[name] for name in ("blue", "red")}
 GIVEN_CACHE = os.environ.get("DYEHOUSE_CACHE")
 
@@ -34,14 +36,14 @@ def mean_rim(found, wrong, **options):
 def test_a_soft_outline_on_neutral_ground(scene, bar):
     found = list(pairs(scene, FAST, COLORS))
     assert mean_rim(found, None) <= bar
-    assert mean_rim(found, None, plain=True) > 15
+    assert mean_rim(found, None, plain=True) > 2.5 * bar
 
 
 @pytest.mark.parametrize("sole", SOLES)
 def test_a_soft_outline_on_colored_ground(sole):
-    found = list(colored_ground(SOLES[sole], FAST, COLORS))
+    found = list(colored_ground(SOLES[sole], FINER, COLORS))
     assert mean_rim(found, None) <= 4
-    assert mean_rim(found, None, plain=True) > 10
+    assert mean_rim(found, None, plain=True) > 8
 
 
 @pytest.mark.parametrize(("wrong", "bar"), [(-2, 8), (-1, 7), (0, 6), (1, 2.5), (2, 2.5)])
@@ -49,10 +51,10 @@ def test_a_mask_a_few_pixels_wrong_on_neutral_ground(wrong, bar):
     assert mean_rim(list(pairs("mug", FAST, COLORS)), wrong, spill=True) <= bar
 
 
-@pytest.mark.parametrize(("wrong", "bar"), [(-2, 16), (-1, 9), (0, 6), (1, 6)])
+@pytest.mark.parametrize(("wrong", "bar"), [(-2, 16), (-1, 9), (0, 6), (1, 9)])
 def test_a_mask_a_few_pixels_wrong_on_colored_ground(wrong, bar):
     for sole in SOLES.values():
-        assert mean_rim(list(colored_ground(sole, FAST, COLORS)), wrong, spill=True) <= bar
+        assert mean_rim(list(colored_ground(sole, FINER, COLORS)), wrong, spill=True) <= bar
 
 
 def test_bleeding_on_a_neutral_surround_moves_along():

@@ -51,15 +51,15 @@ def matte_clicks(pair, count=12):
     return [(int(columns[k]), int(rows[k])) for k in chosen]
 
 
-@pytest.mark.parametrize("scene", ["mug", "fabric_cylinder", "sneaker"])
-def test_a_reference_anywhere_on_the_matte_area_gives_the_same(scene):
+@pytest.mark.parametrize(("scene", "bar"), [("mug", 0.2), ("fabric_cylinder", 0.2), ("sneaker", 0.5)])
+def test_a_reference_anywhere_on_the_matte_area_gives_the_same(scene, bar):
     pair = next(iter(pairs(scene, FAST, COLORS)))
     medians = []
     for x, y in matte_clicks(pair):
         there = replace(pair, view=replace(pair.view, reference=(x, y)))
         analysis = analyze(pair.photo, pair.white, (x, y), pair.view.mask)
         medians.append(np.median(pair.errors(analysis.recolor(analysis.matte_target(there.color(pair.truth))))))
-    assert np.ptp(np.quantile(medians, (0.1, 0.9))) <= 0.2
+    assert np.ptp(np.quantile(medians, (0.1, 0.9))) <= bar
 
 
 @pytest.mark.parametrize("channel", [0, 1, 2])
@@ -77,7 +77,7 @@ def test_reference_and_white_found_cost_little_or_it_asks():
     found = list(footings((*WELL_BEHAVED, *FAILURES), FAST, COLORS))
     costs = np.array([f.both - f.true for f in found])
     unsaid = np.array([not f.asks for f in found])
-    assert np.median(costs) < 0.05
+    assert np.median(costs) < 0.15
     # Of cloth every pixel has a trace of gloss: its matte edge is 0.3 % of the white away from its mean.
     assert {f.scene for f, cost in zip(found, costs, strict=True) if cost > 0.2} - {
         f.scene for f in found if f.asks
@@ -86,7 +86,8 @@ def test_reference_and_white_found_cost_little_or_it_asks():
 
 
 def test_confidence_in_a_white_is_the_chance_that_it_is_right():
-    found, refused = guesses(FAST, lights=3)
+    scenes = ("mug", "clipped", "sneaker", "satin", "metal", "translucent_mug")
+    found, refused = guesses(scenes, FAST, COLORS)
     assert refused > 0
     sure = [g.degrees < 3 for g in found if g.confidence >= SURE_WHITE]
     unsure = [g.degrees < 3 for g in found if g.confidence < SURE_WHITE]

@@ -99,7 +99,6 @@ def a_product_is_recolored_with_the_mouse():
     assert tuple(settings.white_pixel) == CARD, tuple(settings.white_pixel)
 
     # Live: the screen follows the color while the button is still down, and nothing is written.
-    yield from gui.scroll_up(area)
     yield from gui.press(area, "dyehouse.preview")
     yield from gui.settle()
     before, color_before = (yield from _seen(area, region, image)), tuple(product.target.color)
@@ -147,8 +146,7 @@ def a_product_is_recolored_with_the_mouse():
         yield from gui.press(area, "dyehouse.add_colorway", across=0.83)
         yield gui.redrawn
         settings.colorways[settings.active_colorway].name = name
-        yield from gui.scroll_up(area)
-        yield from gui.click(*(yield from gui.find(area, "target.text", across=0.7)))
+            yield from gui.click(*(yield from gui.find(area, "target.text", across=0.7)))
         yield gui.redrawn
         gui.key("ctrl+a")
         gui.write(text)

@@ -85,7 +85,7 @@ def another_file_may_be_opened_meanwhile():
 
 def colorways_have_thumbnails():
     image = gui.load("photo.png")
-    _, area, region = yield from gui.image_editor(image, tab="Dyehouse")
+    _, area, _ = yield from gui.image_editor(image, tab="Dyehouse")
     _set_up(image, SAUCER)
 
     def shown():
