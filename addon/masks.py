@@ -1,7 +1,5 @@
 """What a region of the panel covers: its mask from whatever Blender has."""
 
-import json
-import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -222,22 +220,14 @@ def in_sixteen_bits(coverage: "NDArray") -> "NDArray":
 
 def _composited(path: Path, names: list[str], layer: str, shape: tuple[int, int]) -> "NDArray[np.float32]":
     """The same without OpenImageIO: Blender's compositor has a node for it, whose result must go through a file."""
-    from ..batch import exr
-    from ..core.errors import FileError, MaskError
+    from ..batch import cryptomatte, exr
+    from ..core.errors import FileError
 
     if not path.is_file():
         raise FileError(f"'{path}' does not exist: give the file of a render with cryptomatte passes.")
-    told = exr.Header(path).attributes
-    found = {told[k][1].decode(): told.get(f"{k[:-4]}manifest") for k in told if re.match("cryptomatte/.*/name$", k)}
-    manifests = {name: json.loads(manifest[1]) for name, manifest in found.items() if manifest}
-    if not manifests:
-        raise FileError(f"'{path}' has no cryptomatte: render it with a Cryptomatte pass into a multilayer EXR.")
-    layer = layer or next(
-        (known for known in manifests if manifests[known].keys() >= set(names)), next(iter(manifests))
-    )
-    missing = [name for name in names if name not in manifests.get(layer, {})]
-    if missing:
-        raise MaskError(f"'{path}' has no '{missing[0]}' in {layer}: use one of {', '.join(manifests.get(layer, []))}.")
+    header = exr.Header(path)
+    found = cryptomatte.told_names({name: header.getattribute(name) for name in header.attributes}, path)
+    layer = cryptomatte.chosen(found, names, layer, path)
     scene = bpy.data.scenes.new("Dyehouse")
     tree = bpy.data.node_groups.new("Dyehouse", "CompositorNodeTree")
     image = bpy.data.images.load(str(path), check_existing=False)

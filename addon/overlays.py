@@ -151,7 +151,7 @@ def _gamut(now: preview.Shown, regions: "list[RegionMatrix]") -> Map:
     outside = out_of_gamut(now.whole.recolored(regions)) & product
     colors = np.zeros((*outside.shape, 4), np.float32)
     colors[outside] = (*_OUT_OF_GAMUT, 1)
-    part = np.count_nonzero(outside) / max(1, np.count_nonzero(product))
+    part = outside[product].mean() if product.any() else 0.0
     return Map(colors, f"{part:.1%} of the product outside {now.look.photo.space.name}")
 
 

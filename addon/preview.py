@@ -435,26 +435,27 @@ def _draw_photo(context: bpy.types.Context, image: bpy.types.Image, now: Shown, 
     if asked.preview and asked.view == "SIDE":
         pictures.append((1 + GAP, 0.0))
         drawing.box(1 + GAP, 0, 1, 1, (0, 0, 0, 0), blend="NONE")  # the editor's own ground, which lies over it there
-    parts = [(now.look.key, now.whole)]
+    drawn: tuple[tuple[object, ...], Layers] = (now.look.key, now.whole)
+    used.add(now.look.key)  # for the next time that the view moves
     scale = place[0] * context.region.width / 2 / width  # pixels of the screen for one of the photo
     if now.whole.step > 1 and scale * now.whole.step > 1:
         boxes = [_visible(place, shift, width, height) for shift, _ in pictures]
-        parts += _detail(context.area, now, boxes, scale)
+        drawn = _detail(context.area, now, boxes, scale) or drawn
     display = display_of(image, photo)
     marked = overlay_of(image) == "REGION" and 0 <= asked.active_region < len(now.whole.firsts)
-    for key, layers in parts:
-        texture, weights = _texture(key, layers, used), layers.weights(regions)
-        for shift, split in pictures:
-            painting = Painting(
-                (place[0], place[1], place[2] + shift * place[0], place[3]),
-                split,
-                layers.firsts[asked.active_region] if marked else 0,
-                asked.overlay_opacity,
-                nearest=scale * layers.step >= 1,
-                opaque=context.space_data.display_channels == "COLOR" or shift > 0,
-            )
-            with canvas().bind():
-                paint(layers, texture, (width, height), weights, display, painting)
+    key, layers = drawn
+    texture, weights = _texture(key, layers, used), layers.weights(regions)
+    for shift, split in pictures:
+        painting = Painting(
+            (place[0], place[1], place[2] + shift * place[0], place[3]),
+            split,
+            layers.firsts[asked.active_region] if marked else 0,
+            asked.overlay_opacity,
+            nearest=scale * layers.step >= 1,
+            opaque=context.space_data.display_channels == "COLOR" or shift > 0,
+        )
+        with canvas().bind():
+            paint(layers, texture, (width, height), weights, display, painting)
 
 
 def _visible(place: tuple[float, ...], shift: float, width: int, height: int) -> "Box | None":
@@ -469,19 +470,19 @@ def _visible(place: tuple[float, ...], shift: float, width: int, height: int) ->
 
 def _detail(
     area: bpy.types.Area, now: Shown, visible: "list[Box | None]", scale: float
-) -> "list[tuple[tuple[object, ...], Layers]]":
+) -> "tuple[tuple[object, ...], Layers] | None":
     """The visible part of the photo in the resolution of the screen, once the view rests."""
     from ..core.errors import DyehouseError
     from ..core.layers import step_for
 
     boxes = [box for box in visible if box is not None]
     if not boxes:
-        return []
+        return None
     box = tuple(pick(edges) for pick, edges in zip((min, min, max, max), zip(*boxes, strict=True), strict=True))
     most = min(_MOST_PIXELS, _MOST_TEXELS // len(now.whole.data))
     step = max(int(1 / scale), step_for((box[3] - box[1], box[2] - box[0]), most))
     if step >= now.whole.step:
-        return []
+        return None
     key = (now.look.key, box, step)
     pointer, instant = area.as_pointer(), time.monotonic()
     view, since = _resting.get(pointer, (None, 0.0))
@@ -496,8 +497,8 @@ def _detail(
             if found is None and not bpy.app.timers.is_registered(background.redraw):
                 bpy.app.timers.register(background.redraw, first_interval=_REST * 1.1)
     except DyehouseError:
-        return []
-    return [] if found is None else [(key, found)]
+        return None
+    return None if found is None else (key, found)
 
 
 def _draw_notes() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -57,13 +57,7 @@ def matte(path: str | Path, names: Sequence[str], layer: str = "") -> NDArray[np
     """
     with _opened(path) as source:
         found = _names(source, path)
-        layer = layer or next((known for known in found if found[known].keys() >= set(names)), next(iter(found)))
-        if layer not in found:
-            raise MaskError(f"'{path}' has no cryptomatte layer '{layer}': use one of {', '.join(found)}.")
-        for name in names:
-            if name not in found[layer]:
-                near = difflib.get_close_matches(name, found[layer]) or sorted(found[layer])[:10]
-                raise MaskError(f"Layer {layer} of '{path}' has no '{name}': use one of {', '.join(near)}.")
+        layer = chosen(found, names, layer, path)
         ids = np.array([int(found[layer][name], 16) for name in names], np.uint32).view(np.float32)
         covered = sum(_covered(ranks, ids) for ranks in _ranks(source, layer))
     if not isinstance(covered, np.ndarray):
@@ -86,14 +80,31 @@ def _opened(path: str | Path) -> Iterator[Any]:
 
 
 def _names(source: Any, path: str | Path) -> dict[str, dict[str, str]]:
-    told = {a.name: a.value for a in source.spec(0).extra_attribs if a.name.startswith("cryptomatte/")}
-    layers = {told[key]: told.get(f"{key[:-4]}manifest") for key in told if key.endswith("/name")}
+    return told_names({a.name: a.value for a in source.spec(0).extra_attribs}, path)
+
+
+def told_names(attributes: Mapping[str, Any], path: str | Path) -> dict[str, dict[str, str]]:
+    """What the attributes of an EXR name, as :func:`names_in`; errors as there."""
+    keys = [key for key in attributes if key.startswith("cryptomatte/") and key.endswith("/name")]
+    layers = {attributes[key]: attributes.get(f"{key[:-4]}manifest") for key in keys}
     if not layers:
         raise FileError(f"'{path}' has no cryptomatte: render it with a Cryptomatte pass into a multilayer EXR.")
     try:
         return {layer: json.loads(manifest or "") for layer, manifest in layers.items()}
     except ValueError:
         raise FileError(f"'{path}' does not list the names of its cryptomatte: render it with them inside.") from None
+
+
+def chosen(found: Mapping[str, Mapping[str, str]], names: Sequence[str], layer: str, path: str | Path) -> str:
+    """The layer that is meant, which has all the names; parameters and errors as for :func:`matte`."""
+    layer = layer or next((known for known in found if found[known].keys() >= set(names)), next(iter(found)))
+    if layer not in found:
+        raise MaskError(f"'{path}' has no cryptomatte layer '{layer}': use one of {', '.join(found)}.")
+    for name in names:
+        if name not in found[layer]:
+            near = difflib.get_close_matches(name, found[layer]) or sorted(found[layer])[:10]
+            raise MaskError(f"Layer {layer} of '{path}' has no '{name}': use one of {', '.join(near)}.")
+    return layer
 
 
 def _ranks(source: Any, layer: str) -> Iterator[NDArray[np.float32]]:

@@ -385,12 +385,6 @@ def analyze(
             "card for the white."
         )
     evidence = choose(picture, found.color, w, m, found.pixel, model)
-    if model in ("auto", "bounce") and found.gloss > 0:
-        # Folds are more saturated than a matte ridge, which makes it look glossy beside them.
-        read = Reference(found.color + found.gloss * w, found.pixel)
-        folds = choose(picture, read.color, w, m, read.pixel, model)
-        if folds.mixture.model == "bounce" and not folds.mixture.keeps_white:
-            found, evidence = read, folds
     gain = stability.noise_gain(found.color, w)
     warnings = (
         reference_warnings(found, w, model)

@@ -16,8 +16,8 @@ from dyehouse.core.colorspace import SRGB
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
 PATHS = MANIFEST["build"]["paths"]
-# Only the command line outside Blender uses these.
-NOT_SHIPPED = {"batch/demo.py", "batch/sheet.py"}
+# Only the command line outside Blender uses it.
+NOT_SHIPPED = {"batch/demo.py"}
 
 
 def test_every_module_is_listed_and_every_listed_file_exists() -> None:

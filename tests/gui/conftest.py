@@ -137,8 +137,8 @@ class Blender:
             "import gui_kit\n"
             f"gui_kit.run({str(file)!r}, {str(folder)!r}, {scenarios!r})\n"
         )
-        arguments = ["--no-window-focus", "--window-geometry", "0", "0", "1600", "1000", "--python-expr", code]
-        done = self.run(*arguments, timeout=150 + 120 * len(scenarios))
+        size = ["--no-window-focus", "--window-geometry", "0", "0", "1600", "1000"]
+        done = self.run(*size, "--python-exit-code", "1", "--python-expr", code, timeout=360 + 120 * len(scenarios))
         log = done.stdout + done.stderr
         (folder / "blender.log").write_text(log)
         outcome = Outcome(folder, log)

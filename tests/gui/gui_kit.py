@@ -47,7 +47,7 @@ def run(file, where, names):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     # A window that hangs in a call of Blender must end as well.
-    watchdog = threading.Timer(120.0 + 120.0 * len(names), _leave, ["no end in sight"])
+    watchdog = threading.Timer(300.0 + 120.0 * len(names), _leave, ["no end in sight"])
     watchdog.daemon = True
     watchdog.start()
     queue = [(name, getattr(module, name)) for name in names]
@@ -100,7 +100,9 @@ def _leave(why):
 
 
 def _start_afresh():
+    global _page
     _xdo("mousemove", 0, 0)
+    _page = 0
     with bpy.context.temp_override(window=main_window()):
         bpy.ops.wm.read_homefile(use_factory_startup=True, load_ui=True)
     for space in (bpy.types.SpaceImageEditor, bpy.types.SpaceView3D, bpy.types.SpaceNodeEditor):
@@ -295,11 +297,9 @@ def find(area, name, across=0.6):
     ui = region_of(area, "UI")
     x = ui.x + ui.width * across
     remembered = _found.get((area.ui_type, name))
-    pages = range(_PAGES)
-    if remembered:
-        pages = [remembered[0], *pages]
-    for page in pages:
-        yield from _turn(ui, page)
+    pages = [*range(_page, _PAGES), *range(_page)]  # from where it is scrolled to
+    for page in ([remembered[0]] if remembered else []) + pages:
+        yield from _turn(area, page)
         heights = list(range(ui.y + ui.height - 8, ui.y, -19))  # a button is 20 high
         if remembered:
             heights.insert(0, remembered[1])
@@ -313,17 +313,20 @@ def find(area, name, across=0.6):
 
 
 _PAGES = 5  # of a long sidebar
+_page = 0  # where it is scrolled to
 _found = {}  # page and height of a button, where it was last time
 
 
-def _turn(ui, page):
-    """Scroll to a page of the sidebar with the mouse wheel."""
-    move(ui.x + ui.width * 0.5, ui.y + ui.height * 0.5)
-    yield PAUSE
-    _xdo("click", "--repeat", 50, "--delay", 1, 4)
-    if page:
-        _xdo("click", "--repeat", 10 * page, "--delay", 1, 5)
-    yield redrawn
+def _turn(area, page):
+    """Scroll to a page of the sidebar with the mouse wheel; a short sidebar would pass it on to the picture."""
+    global _page
+    if page != _page:
+        ui = region_of(area, "UI")
+        move(ui.x + ui.width * 0.5, ui.y + ui.height * 0.5)
+        yield PAUSE
+        _xdo("click", "--repeat", 10 * abs(page - _page), "--delay", 1, 5 if page > _page else 4)
+        _page = page
+        yield redrawn
 
 
 def _hovered(area, region):

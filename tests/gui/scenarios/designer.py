@@ -146,7 +146,7 @@ def a_product_is_recolored_with_the_mouse():
         yield from gui.press(area, "dyehouse.add_colorway", across=0.83)
         yield gui.redrawn
         settings.colorways[settings.active_colorway].name = name
-            yield from gui.click(*(yield from gui.find(area, "target.text", across=0.7)))
+        yield from gui.click(*(yield from gui.find(area, "target.text", across=0.7)))
         yield gui.redrawn
         gui.key("ctrl+a")
         gui.write(text)

@@ -1,0 +1,136 @@
+"""The ladder of models against renders of the product truly in the other color, case by case, at quick size.
+
+The bars are what was measured, with a small margin. They may only be tightened.
+"""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dyehouse.benchmarks import laboratory, ladder, speed_accuracy
+from dyehouse.benchmarks.camera import Camera
+from dyehouse.benchmarks.ladder import BEST, CASES, METALS, NEUTRAL, PALE, Case, measure, trials
+from dyehouse.benchmarks.speed_accuracy import difference
+from dyehouse.core.neighborhood import dilate
+
+FAST = replace(laboratory.FAST, threads=2)
+COLORS = {name: speed_accuracy.COLORS[name] for name in ("blue", "red")}
+GIVEN_CACHE = os.environ.get("DYEHOUSE_CACHE")
+
+BARS = {  # case: CIEDE2000 of "auto", median and 95th percentile over the pairs; and the model it takes
+    "glossy mug": (0.16, 0.63, "dichromatic"),
+    "fabric on a cylinder": (0.14, 0.43, "dichromatic"),
+    "cloth in deep folds": (0.065, 0.24, "bounce"),
+    "clipped highlights": (0.13, 0.65, "dichromatic"),
+    "recolored into tungsten light": (0.14, 0.66, "dichromatic"),
+    "metal, gray surroundings": (0.0075, 1.64, "dichromatic"),
+    "metal, colored surroundings": (0.21, 10.6, "metal"),
+}
+"""Those whose renders the other tests need too."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _cache(tmp_path_factory):
+    # The renders of a test session are shared by its modules; a folder that the user keeps is used as it is.
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DYEHOUSE_CACHE", GIVEN_CACHE or str(tmp_path_factory.getbasetemp() / "renders-fast"))
+        patch.setattr(ladder, "COLORS", COLORS)
+        yield
+
+
+@pytest.mark.parametrize("title", BARS)
+def test_a_case_stays_within_its_bars(title):
+    case = next(c for c in CASES if c.title == title)
+    figures, taken = measure(case, FAST)
+    median, high, model = BARS[title]
+    assert figures["auto"][0] <= median
+    assert figures["auto"][1] <= high
+    assert set(taken) == {model}
+
+
+def pale(scene, names, **options):
+    colors = PALE | NEUTRAL
+    return Case(scene, scene, sources={name: colors[name] for name in names}, **options)
+
+
+def test_pale_folds_are_ruined_by_the_plain_model_and_not_by_auto():
+    for camera, bars in ((None, (0.1, 0.6)), (Camera(), (0.3, 1.3))):
+        figures, taken = measure(pale("folds", ["pink"], camera=camera), FAST)
+        assert set(taken) == {"bounce"}
+        assert figures["dichromatic"][1] > 20
+        assert figures["auto"][0] <= bars[0]
+        assert figures["auto"][1] <= bars[1]
+
+
+@pytest.mark.parametrize(
+    ("scene", "names"), [("mug", ["white", "gray", "black"]), ("fabric_cylinder", ["gray"])], ids=["mug", "fabric"]
+)
+def test_almost_gray_through_a_camera_is_never_worse_than_body_alone(scene, names):
+    figures, _ = measure(pale(scene, names, camera=Camera()), FAST)
+    assert figures["auto"][0] <= max(2.0, figures["body"][0] * 1.01)
+    assert figures["auto"][1] <= min(9.0, figures["body"][1] * 1.01)
+    assert figures["dichromatic"][1] > 3 * figures["auto"][1]
+
+
+def test_noise_costs_little_on_a_pale_mug_made_strong():
+    exact, noisy = (measure(pale("mug", ["pink"], camera=c), FAST)[0] for c in (None, Camera()))
+    assert noisy["auto"][0] < noisy["dichromatic"][0] / 2
+    assert noisy["auto"][1] < noisy["dichromatic"][1] / 3
+    assert noisy["auto"][1] < noisy["body"][1]
+    assert exact["auto"][1] < exact["dichromatic"][1] / 5
+
+
+def test_a_noisy_photo_is_not_blotchy():
+    # Spatial noise beside that of a photo that the same camera takes of the true product.
+    camera = Camera()
+    trial = next(t for t in trials(pale("mug", ["pink"], camera=camera), FAST) if t.target == "red")
+    result = trial.recolored(trial.analysis("auto"))
+    plain = trial.recolored(trial.analysis("dichromatic"))
+    inside = trial.view.interior[:, 1:] & trial.view.interior[:, :-1]
+
+    def grain(picture):
+        # From pixel to pixel along the rows, beyond what the true picture changes there.
+        step = difference(picture[:, 1:], picture[:, :-1]) - difference(trial.truth[:, 1:], trial.truth[:, :-1])
+        return float(np.quantile(np.abs(step[inside]), 0.75))
+
+    real = grain(camera.photograph(trial.truth))
+    assert grain(result) < 1.5 * real
+    assert grain(plain) > 1.5 * real
+
+
+def test_clipped_highlights_have_no_hole_and_no_rim():
+    # The pale mug, brighter: its highlight is clipped in one channel after the other.
+    for trial in trials(pale("mug", ["beige"], camera=Camera(exposure=1.6)), FAST):
+        clipped = (trial.picture.linear() >= 1).any(axis=2) & trial.view.interior
+        rim = dilate(clipped, 1) & trial.view.interior
+        if clipped.sum() < 20:
+            continue
+        bright = np.minimum(trial.truth * np.float32(1.6), 1)
+        seen = trial.analysis("auto")
+        target = seen.matte_target(1.6 * trial.truth[trial.view.reference[1], trial.view.reference[0]].astype(float))
+        light = np.minimum(seen.recolor(target), 1).mean(axis=2)
+        assert (light - bright.mean(axis=2))[rim].min() > -0.2
+
+
+def test_metal_has_a_gain_for_each_channel_in_colored_surroundings():
+    figures, taken = measure(Case("", "metal", sources={"copper": METALS["copper"]}), FAST)
+    assert set(taken) == {"metal"}
+    assert figures["auto"][0] < figures["dichromatic"][0] / 10
+    assert figures["auto"][1] < figures["dichromatic"][1] / 2
+
+
+def test_auto_is_better_than_the_best_plain_model_where_light_met_the_cloth_twice():
+    figures, _ = measure(next(c for c in CASES if c.title == "cloth in deep folds"), FAST)
+    assert figures["auto"][1] < figures[BEST][1] / 2
+
+
+@pytest.mark.parametrize(("scene", "source"), [("mug", "red"), ("folds", "blue"), ("fabric_cylinder", "red")])
+def test_the_choice_is_the_same_for_every_noise(scene, source):
+    colors = {source: COLORS[source]}
+    chosen = set()
+    for seed in range(5):
+        case = Case("", scene, sources=colors, camera=Camera(seed=seed))
+        chosen |= {trial.analysis("auto").model for trial in trials(case, FAST)}
+    assert len(chosen) == 1
