@@ -50,7 +50,7 @@ def main() -> None:
         (shop / "suit.toml").write_text(RECIPE)
         (shop / "catalog.csv").write_text(TABLE)
         out = shop / "out"
-        arguments = [str(shop / "suit.toml"), str(shop / "catalog.csv"), "--out", str(out), "--max-error", "15"]
+        arguments = [str(shop / "suit.toml"), str(shop / "catalog.csv"), "--out", str(out), "--max-error", "6"]
         if dyehouse(["batch", *arguments, "--allow-warnings"]):
             raise SystemExit("the catalog failed")
         shutil.copy(out / "sheets" / "coffee.jpg", FIGURES / "catalog-sheet.jpg")

@@ -198,7 +198,7 @@ def in_bands(scene: str, settings: Settings, names: tuple[str, ...] = ("blue", "
 
 
 # --- Cost -------------------------------------------------------------------------------------------------
-def costs(rounds: int = 5, side: int = 2000) -> dict[str, tuple[float, float]]:
+def costs(rounds: int = 3, side: int = 2000) -> dict[str, tuple[float, float]]:
     """Time of looking at a photo and of one more colorway, in times those of the dichromatic model; medians."""
     photo = speed.test_picture(side, side)
     reference, target = photo[side // 2, side // 2].astype(np.float64), (0.02, 0.08, 0.2)

@@ -35,7 +35,7 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 MEDIAN_LIMIT, HIGH_LIMIT = 2.0, 10.0
 """CIEDE2000 from which a result should be refused, or the user told: median, 95th percentile."""
 
-NOTHING, WARNS, FALLS_BACK, REFUSES = "", "warns", "falls back", "refuses"
+NOTHING, WARNS, FALLS_BACK, REFUSES = "", "warns", "takes another model", "refuses"
 SOURCES = ("red", "blue")
 TARGETS: Mapping[str, RGB] = COLORS
 """Colors of most curves: from each of the one to each other of these."""
@@ -105,11 +105,13 @@ class Outcome:
         CIEDE2000 of the dichromatic model over the pixels; `high` is the 95th percentile.
     body_median, body_high, body_mean
         The same of body reflection alone.
+    auto_median, auto_high, auto_mean
+        The same of the model that the program takes by itself.
     A, B
         Median error of the coefficients of the dichromatic model; A relative to the color at the true reference. True
         are those that fit both true renders best.
     does
-        What `analyze` does by itself: nothing, warns, falls back to the body model, or refuses.
+        What `analyze` does by itself: nothing, warns, takes another model than the dichromatic one, or refuses.
     """
 
     median: float
@@ -118,6 +120,9 @@ class Outcome:
     body_median: float
     body_high: float
     body_mean: float
+    auto_median: float
+    auto_high: float
+    auto_mean: float
     A: float
     B: float
     does: str
@@ -125,9 +130,10 @@ class Outcome:
     @property
     def should(self) -> str:
         """What it should do, by the measurement."""
-        if min(self.median, self.body_median) > MEDIAN_LIMIT or min(self.high, self.body_high) > HIGH_LIMIT:
+        medians, highs = (self.median, self.body_median, self.auto_median), (self.high, self.body_high, self.auto_high)
+        if min(medians) > MEDIAN_LIMIT or min(highs) > HIGH_LIMIT:
             return REFUSES
-        return FALLS_BACK if self.body_mean < 0.9 * self.mean else NOTHING
+        return FALLS_BACK if min(self.body_mean, self.auto_mean) < 0.9 * self.mean else NOTHING
 
 
 def outcome(trials: Iterable[Trial]) -> Outcome:
@@ -136,12 +142,12 @@ def outcome(trials: Iterable[Trial]) -> Outcome:
     for trial in trials:
         try:
             auto = analyze(trial.picture, trial.white, trial.pixel, trial.mask)
-            deeds.append(FALLS_BACK if auto.model == "body" else WARNS if auto.warnings else NOTHING)
+            deeds.append(FALLS_BACK if auto.model != "dichromatic" else WARNS if auto.warnings else NOTHING)
         except DyehouseError:
             deeds.append(REFUSES)
         v = read(trial.picture, trial.pixel, trial.white)
         row: list[float] = []
-        for model in ("dichromatic", "body"):
+        for model in ("dichromatic", "body", "auto"):
             analysis = analyze(trial.picture, trial.white, v, trial.mask, model)
             result = analysis.recolor(trial.target)[trial.where] / trial.exposure
             errors = difference(result, trial.truth[trial.where], trial.true_white)
@@ -149,9 +155,7 @@ def outcome(trials: Iterable[Trial]) -> Outcome:
             if model == "dichromatic":
                 coefficients = analysis.A[trial.where], analysis.B[trial.where]
         figures.append([*row, *_coefficient_errors(trial, v, *coefficients)])
-    median, high, mean, body_median, body_high, body_mean, a, b = (float(f) for f in np.mean(figures, axis=0))
-    does = Counter(deeds).most_common(1)[0][0]
-    return Outcome(median, high, mean, body_median, body_high, body_mean, a, b, does)
+    return Outcome(*(float(f) for f in np.mean(figures, axis=0)), does=Counter(deeds).most_common(1)[0][0])
 
 
 def _coefficient_errors(trial: Trial, v: NDArray, a: NDArray, b: NDArray) -> tuple[float, float]:
@@ -483,8 +487,8 @@ GROUPS: dict[str, tuple[tuple[Callable[[Settings], Curve], str], ...]] = {
     "photo": (
         (
             noise,
-            "The error of a colored product grows in proportion to noise; on matte cloth, where there is no gloss to "
-            "lose, the body model overtakes it well before the picture is useless, and nothing is said.",
+            "The error of the plain model grows in proportion to noise, and the body model overtakes it on matte "
+            "cloth; the regularized model, taken from some noise on, keeps what either has.",
         ),
         (
             bit_depth,
@@ -520,13 +524,13 @@ GROUPS: dict[str, tuple[tuple[Callable[[Settings], Curve], str], ...]] = {
     "product": (
         (
             source_chroma,
-            "Without noise even an almost gray product can be split, and the fallback throws highlights away; with "
-            "an ordinary camera's noise it is right from about where it happens.",
+            "Without noise even an almost gray product can be split, and is; with an ordinary camera's noise the plain "
+            "model fails from some paleness on, and smoothing the split mends most of it.",
         ),
         (
             fold_depth,
-            "Light that met the cloth twice spoils every color in the folds and ruins a pale cloth everywhere, because "
-            "it is taken for gloss below zero; the body model does far better there and is not chosen.",
+            "Light that met the cloth twice spoils every color in the folds and ruins a pale cloth everywhere under "
+            "the plain model, which takes it for gloss below zero; the bounce as a term of its own does not.",
         ),
         (
             translucency,
@@ -537,8 +541,8 @@ GROUPS: dict[str, tuple[tuple[Callable[[Settings], Curve], str], ...]] = {
     "geometry": (
         (
             mask_edge,
-            "The rim of a mask that is too tight is the worst of all errors here, and one too soft comes next; on "
-            "neutral ground a mask that is too wide does good, since it takes the colored light on the table along.",
+            "A hard mask that is too tight leaves a rim of the old color, the worst of all errors here; a soft mask, or "
+            "one that is too wide, on neutral ground does good.",
         ),
         (
             resolution,
@@ -576,8 +580,9 @@ def draw(curves: Sequence[Curve], path: Path) -> None:
             color = f"C{k}"
             x = [x for x, _ in line.points]
             each = [o for _, o in line.points]
-            upper.plot(x, [o.median for o in each], "-o", color=color, ms=3)
-            upper.plot(x, [o.high for o in each], "--", color=color, lw=1)
+            upper.plot(x, [o.auto_median for o in each], "-o", color=color, ms=3)
+            upper.plot(x, [o.auto_high for o in each], "--", color=color, lw=1)
+            upper.plot(x, [o.median for o in each], "-.", color=color, lw=1)
             upper.plot(x, [o.body_median for o in each], ":", color=color, lw=1.2)
             lower.plot(x, [max(o.A, 1e-5) for o in each], "-o", color=color, ms=3)
             lower.plot(x, [max(o.B, 1e-5) for o in each], "--", color=color, lw=1)
@@ -610,8 +615,9 @@ def draw(curves: Sequence[Curve], path: Path) -> None:
     figure.text(
         0.5,
         0.005,
-        "Top: large and hollow, what it should do; small and full, what it does (triangle: warn, square: fall back, "
-        "cross: refuse).\nMiddle: median (solid), 95th percentile (dashed), median of the body model (dotted). "
+        "Top: large and hollow, what it should do; small and full, what it does (triangle: warn, square: take another "
+        "model, cross: refuse).\nMiddle: auto, median (solid) and 95th percentile (dashed); median of the dichromatic "
+        "(dash-dotted) and the body model (dotted). "
         "Bottom: A (solid), B (dashed).",
         ha="center",
         fontsize=8,
@@ -628,9 +634,7 @@ def worst(curves: Sequence[Curve], most: int = 20) -> list[str]:
     for curve in curves:
         for line in curve.series:
             for x, o in line.points:
-                body = o.does == FALLS_BACK
-                chosen = (o.body_median, o.body_high) if body else (o.median, o.high)
-                rows.append((chosen, curve, line, x, o))
+                rows.append(((o.auto_median, o.auto_high), curve, line, x, o))
     rows.sort(key=lambda row: -row[0][1])
     lines = [
         "| curve | series | at | as chosen | dichromatic | body | should | does |",
@@ -648,7 +652,7 @@ def worst(curves: Sequence[Curve], most: int = 20) -> list[str]:
 def from_where(curves: Sequence[Curve]) -> list[str]:
     """Lines of a table of the marks: at which x every series should fall back or refuse, and what it does there."""
     lines = [
-        "| curve | series | should fall back at | should refuse at | of these it says nothing at |",
+        "| curve | series | should take another model at | should refuse at | of these it says nothing at |",
         "|" + "---|" * 5,
     ]
     for curve in curves:
@@ -668,9 +672,10 @@ that fit both true renders best. The renders' own noise is common to all channel
 camera without noise."""
 
 _SHOULD = """\
-By the measurement, a method *should* refuse, or at least say so, where even the better model is beyond a median of
-{median:g} or a 95th percentile of {high:g}, and *should* fall back where the body model alone does better than the
-dichromatic one by a tenth in the mean. What it *does* is what `analyze` does by itself, most often."""
+By the measurement, a method *should* refuse, or at least say so, where even the best model is beyond a median of
+{median:g} or a 95th percentile of {high:g}, and *should* take another model where the body model, or the one that it
+finds, does better than the dichromatic one by a tenth in the mean. What it *does* is what `analyze` does by itself,
+most often."""
 
 
 def main() -> None:
@@ -707,7 +712,7 @@ def main() -> None:
             "",
             *worst(everything),
             "",
-            "## Where it should fall back or refuse",
+            "## Where it should take another model or refuse",
             "",
             *from_where(everything),
             "",

@@ -38,18 +38,18 @@ from .stability import Noise
 # Fitted: `uv run --group bench python -m dyehouse.benchmarks.calibration --fit`.
 WEIGHTS: Mapping[str, float] = {
     "noise": 1.0,
-    "reference": 0.35,
-    "residual": 0.41,
+    "reference": 0.7,
+    "residual": 0.42,
     "body": 0.7,
-    "hue": 0.16,
+    "hue": 0.15,
     "grain": 0.22,
-    "lights": 0.23,
-    "gray": 0.15,
+    "lights": 0.2,
+    "gray": 0.14,
 }
 
 # 90 % of pixels are below this times their own predicted error; and below this times the 90th percentile of their
 # region's.
-PIXEL_BOUND, REGION_BOUND = 3.1, 2.3
+PIXEL_BOUND, REGION_BOUND = 3.2, 2.4
 
 # Predicted median from which a recolor is flagged; and median difference from the plain model from which one is that
 # takes the product for metal or sees two lights.

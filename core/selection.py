@@ -21,7 +21,7 @@ from .separation import MODEL_ERROR, NO_GLOSS, USUAL_BOUNCE, frame, split
 from .stability import Noise
 
 # Pixels that are looked at, for the models and for the noise.
-_SAMPLE, _ROWS = 8_000, 25_000
+_SAMPLE, _ROWS = 6_000, 12_000
 
 # Light under which a pixel tells nothing, against the reference.
 _DARK = 0.08

@@ -548,7 +548,7 @@ BAD_OPTIONS = [
     (["--target", "rgb(nan,0,0)"], "rgb|finite|number"),
     (["--target", "missing.csv"], "missing.csv"),
     (["--target", ""], "target"),
-    (["--model", "metal"], "is not known"),
+    (["--model", "wood"], "is not known"),
     (["--model", "dichromatic", "--reference", "0.3,0.3,0.3"], "color of the white"),
     (["--residual", "most"], "fade, keep, drop"),
     (["--residual", "1.5"], "fade, keep, drop"),

@@ -300,12 +300,15 @@ def find(area, name, across=0.6):
     pages = [*range(_page, _PAGES), *range(_page)]  # from where it is scrolled to
     for page in ([remembered[0]] if remembered else []) + pages:
         yield from _turn(area, page)
-        heights = list(range(ui.y + ui.height - 8, ui.y, -19))  # a button is 20 high
+        heights = list(range(ui.y + ui.height - 8, ui.y, -10))  # a button is 20 high
         if remembered:
             heights.insert(0, remembered[1])
         for y in heights:
             move(x, y)
             yield PAUSE
+            if not _hovered(area, ui).endswith(name):
+                continue
+            yield 2 * PAUSE  # it may be the one before, not yet left
             if _hovered(area, ui).endswith(name):
                 _found[area.ui_type, name] = page, y
                 return x, y
@@ -322,7 +325,7 @@ def _turn(area, page):
     global _page
     if page != _page:
         ui = region_of(area, "UI")
-        move(ui.x + ui.width * 0.5, ui.y + ui.height * 0.5)
+        move(ui.x + 4, ui.y + ui.height * 0.5)  # beside the lists, which have a wheel of their own
         yield PAUSE
         _xdo("click", "--repeat", 10 * abs(page - _page), "--delay", 1, 5 if page > _page else 4)
         _page = page

@@ -71,7 +71,8 @@ def test_almost_gray_through_a_camera_is_never_worse_than_body_alone(scene, name
     figures, _ = measure(pale(scene, names, camera=Camera()), FAST)
     assert figures["auto"][0] <= max(2.0, figures["body"][0] * 1.01)
     assert figures["auto"][1] <= min(9.0, figures["body"][1] * 1.01)
-    assert figures["dichromatic"][1] > 3 * figures["auto"][1]
+    # The plain model is far worse, or refuses.
+    assert not figures["dichromatic"][1] <= 3 * figures["auto"][1]
 
 
 def test_noise_costs_little_on_a_pale_mug_made_strong():
@@ -101,17 +102,24 @@ def test_a_noisy_photo_is_not_blotchy():
 
 
 def test_clipped_highlights_have_no_hole_and_no_rim():
-    # The pale mug, brighter: its highlight is clipped in one channel after the other.
-    for trial in trials(pale("mug", ["beige"], camera=Camera(exposure=1.6)), FAST):
+    # The beige mug, overexposed: its highlight is clipped in one channel after the other.
+    exposure = 1.6
+    for trial in trials(pale("mug", ["beige"], camera=Camera(exposure=exposure)), FAST):
         clipped = (trial.picture.linear() >= 1).any(axis=2) & trial.view.interior
         rim = dilate(clipped, 1) & trial.view.interior
-        if clipped.sum() < 20:
-            continue
-        bright = np.minimum(trial.truth * np.float32(1.6), 1)
-        seen = trial.analysis("auto")
-        target = seen.matte_target(1.6 * trial.truth[trial.view.reference[1], trial.view.reference[0]].astype(float))
-        light = np.minimum(seen.recolor(target), 1).mean(axis=2)
-        assert (light - bright.mean(axis=2))[rim].min() > -0.2
+        assert clipped.sum() > 20
+        bright = np.minimum(trial.truth * np.float32(exposure), 1).mean(axis=2)
+        x, y = trial.view.reference
+
+        def darkest(model, trial=trial, rim=rim, bright=bright, at=(y, x)):
+            seen = trial.analysis(model)
+            target = seen.matte_target(exposure * trial.truth[at].astype(float))
+            return (np.minimum(seen.recolor(target), 1).mean(axis=2) - bright)[rim]
+
+        restored, body = darkest("auto"), darkest("body")
+        assert abs(np.median(restored)) < 0.02
+        assert restored.min() > body.min() + 0.03
+        assert np.abs(restored).mean() < 0.6 * np.abs(body).mean()
 
 
 def test_metal_has_a_gain_for_each_channel_in_colored_surroundings():

@@ -18,7 +18,7 @@ def the_panel_is_ready_to_use():
     areas = [a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == "IMAGE_EDITOR"]
     assert areas, "no Image Editor is shown"
     assert areas[0].spaces.active.image == image
-    window, area, region = yield from gui.image_editor(image, tab="Dyehouse")
+    _, area, region = yield from gui.image_editor(image, tab="Dyehouse")
     yield lambda: session.last(image) is not None
     yield gui.redrawn
     image.dyehouse.view = "FULL"

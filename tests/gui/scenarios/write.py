@@ -65,7 +65,10 @@ def escape_leaves_whole_files_only():
         assert images.pixels_of(found).shape[:2] == (height, width), name
     left = [path.name for path in gui.folder.iterdir() if path.name.startswith((".dyehouse", "stopped"))]
     assert len(left) == len(written), f"{left} are left"
-    bpy.ops.dyehouse.write_colorways(image=image.name, pattern=output, overwrite=True)  # and nothing is in the way
+    # Nothing is in the way of another try.
+    asked = {"pattern": output, "overwrite": True}
+    gui.call(window, area, region, bpy.ops.dyehouse.write_colorways, "INVOKE_DEFAULT", **asked)
+    yield lambda: write.progress() is None
     assert _written("stopped-{colorway}.png") == set(COLORS)
 
 
