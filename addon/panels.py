@@ -383,6 +383,8 @@ class DYEHOUSE_PT_write(_Part, bpy.types.Panel):
         if progress:
             done, total, text = progress
             column.progress(factor=done / total, type="BAR", text=text, translate=False)
+        for sentence in write.delivered(image):
+            sentences(layout, context, sentence, "CHECKMARK")
         row = layout.row(align=True)
         row.operator("dyehouse.save_recipe", icon="EXPORT")
         row.operator("dyehouse.load_recipe", icon="IMPORT")

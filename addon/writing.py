@@ -212,12 +212,31 @@ def save_mask(path: Path, coverage: "NDArray") -> None:
         _write_with_blender(path, pixels, photo, force=True, quality=100, compression=None)
 
 
-def to_image(photo: "Photo", prepared: "Prepared", name: str) -> "tuple[bpy.types.Image, Shares]":
-    """Recolor a photo into a new image of the .blend: the same pixels as a file of the photo's own kind has."""
+def begin_image(
+    photo: "Photo", prepared: "Prepared", name: str, watch: Callable[[float], None] | None = None
+) -> "Callable[[], tuple[bpy.types.Image, Shares]]":
+    """Recolor a photo for a new image of the .blend, in any thread; the main thread has to call what is returned.
+
+    The image has the same pixels as a file of the photo's own kind.
+    """
     from ..batch import files
     from ..batch import photo as photos
 
     kind = "image.tif"  # holds every kind of pixels
-    pixels, shares = photos.recolored(photo, prepared, kind)
+    pixels, shares = photos.recolored(photo, prepared, kind, watch=watch)
     premultiplied = files.output_premultiplied(kind, photo)
-    return images.new_image(name, pixels, files.output_space(kind, photo), premultiplied), shares
+    return lambda: (images.new_image(name, pixels, files.output_space(kind, photo), premultiplied), shares)
+
+
+def to_image(photo: "Photo", prepared: "Prepared", name: str) -> "tuple[bpy.types.Image, Shares]":
+    """Recolor a photo into a new image of the .blend; see :func:`begin_image`."""
+    return begin_image(photo, prepared, name)()
+
+
+def verified(photo: "Photo", prepared: "Prepared", path: Path) -> list[str]:
+    """Read a file back: how near it came to the asked color, a sentence for each region; none without OpenImageIO."""
+    from ..batch import verification
+
+    if not images.reads_files():
+        return []
+    return [found.sentence for found in verification.expect(photo, prepared).check(path)]

@@ -79,11 +79,12 @@ def with_shares(figures: dict[str, Any], shares: Shares) -> dict[str, Any]:
     """The same report with what the output could not hold."""
     return figures | {
         "out_of_gamut_share": shares.out_of_gamut,
-        "warnings": figures["warnings"] + _gamut_warning(shares),
+        "warnings": figures["warnings"] + gamut_warning(shares),
     }
 
 
-def _gamut_warning(shares: Shares) -> list[str]:
+def gamut_warning(shares: Shares) -> list[str]:
+    """Sentence on what an integer output cannot hold, if that is worth one."""
     if shares.out_of_gamut < 0.001:
         return []
     return [

@@ -595,7 +595,7 @@ def main() -> None:
             of their names, was used to fit the weights and bounds of `core/confidence.py` (`--fit` prints them); the
             other half is held out, but it is of the same scenes. The 90 % bound of a pixel is
             {confidence.PIXEL_BOUND:.1f} times its predicted error, that of a region {confidence.REGION_BOUND:.1f} times
-            its 90th percentile. Flagged is what is predicted to have a median over {confidence.FLAG:.1f}, or hangs on
+            its 90th percentile. Flagged is what is predicted to have a median over {confidence.FLAG:g}, or hangs on
             the choice of the model for metal or two lights."""
         ),
         *_predictions(found),

@@ -143,7 +143,6 @@ def trials(case: Case, settings: Settings) -> Iterator[Trial]:
         photo = np.minimum(photos[source], 1)
         picture = Picture(photo) if case.camera is None else Picture(case.camera.shoot(photos[source]), transfer.SRGB)
         truth = np.minimum(photos[target] * (light / white).astype(np.float32), 1)
-        trial = Trial(case.scene, source, target, photo, truth, light, view, picture, light)
         trial = Trial(case.scene, source, target, photo, truth, white, view, picture, light)
         if trial.readable:
             yield trial
@@ -167,8 +166,8 @@ def measure(case: Case, settings: Settings) -> tuple[dict[str, tuple[float, floa
 
 
 def _errors(trial: Trial, result: NDArray) -> NDArray[np.float64]:
-    seen = Pair(*(getattr(trial, name) for name in ("scene", "source", "target", "photo", "truth")),
-                trial.target_white, trial.view)  # fmt: skip
+    t = trial
+    seen = Pair(t.scene, t.source, t.target, t.photo, t.truth, t.target_white, t.view)
     return np.quantile(seen.errors(result), QUANTILES)
 
 

@@ -155,7 +155,8 @@ def outcome(trials: Iterable[Trial]) -> Outcome:
             if model == "dichromatic":
                 coefficients = analysis.A[trial.where], analysis.B[trial.where]
         figures.append([*row, *_coefficient_errors(trial, v, *coefficients)])
-    return Outcome(*(float(f) for f in np.mean(figures, axis=0)), does=Counter(deeds).most_common(1)[0][0])
+    mean = [float(f) for f in np.mean(figures, axis=0)]
+    return Outcome(*mean, Counter(deeds).most_common(1)[0][0])  # type: ignore[arg-type]
 
 
 def _coefficient_errors(trial: Trial, v: NDArray, a: NDArray, b: NDArray) -> tuple[float, float]:
@@ -541,8 +542,8 @@ GROUPS: dict[str, tuple[tuple[Callable[[Settings], Curve], str], ...]] = {
     "geometry": (
         (
             mask_edge,
-            "A hard mask that is too tight leaves a rim of the old color, the worst of all errors here; a soft mask, or "
-            "one that is too wide, on neutral ground does good.",
+            "A hard mask that is too tight leaves a rim of the old color, the worst of all errors here; a soft mask, "
+            "or one that is too wide, on neutral ground does good.",
         ),
         (
             resolution,

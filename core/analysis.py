@@ -384,7 +384,7 @@ def analyze(
             "The white and the reference are the same color: pick the product for the reference, and a white or grey "
             "card for the white."
         )
-    evidence = choose(picture, found.color, w, m, found.pixel, model)
+    found, evidence = _look(picture, found, w, m, model)
     gain = stability.noise_gain(found.color, w)
     warnings = (
         reference_warnings(found, w, model)
@@ -393,6 +393,20 @@ def analyze(
         + _material_warnings(picture, w, m)
     )
     return Analysis(picture, w, found.color, found.pixel, m, evidence, gain, tuple(warnings), found.gloss, spill)
+
+
+def _look(
+    picture: Picture, found: Reference, white: NDArray, mask: NDArray | None, model: str
+) -> tuple[Reference, Evidence]:
+    """Choose the model; and take the reference as it was read where folds, not gloss, set it apart from its region."""
+    evidence = choose(picture, found.color, white, mask, found.pixel, model)
+    if model in ("auto", "bounce") and found.gloss > 0:
+        # Folds are more saturated than a matte ridge, which makes it look glossy beside them.
+        read = Reference(found.color + found.gloss * white, found.pixel)
+        folds = choose(picture, read.color, white, mask, read.pixel, model)
+        if folds.mixture.model == "bounce" and not folds.mixture.keeps_white:
+            return read, folds
+    return found, evidence
 
 
 def _check_finite(picture: Picture) -> None:

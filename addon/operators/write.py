@@ -1,7 +1,7 @@
 """Writing what the panel shows: to an image of the .blend, to a file, or all colorways to files."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from ...batch.files import Photo
-    from ...core.recipe import Prepared
+    from ...core.recipe import Colorway, Prepared, Recipe
+    from ...core.recolor import Shares
 
 # Seconds between looks at the thread that writes.
 _INTERVAL = 0.05
@@ -33,69 +34,6 @@ def _quality() -> Any:
     )
 
 
-def _tell(operator: bpy.types.Operator, look: session.Look, shares: Any) -> None:
-    from ...batch.inspection import report, with_shares
-
-    for warning in with_shares(report(look.photo, look.prepared), shares)["warnings"]:
-        operator.report({"WARNING"}, warning)
-
-
-class DYEHOUSE_OT_write_image(common.RegionOperator, bpy.types.Operator):
-    """Recolor the photo into a new image of the .blend"""
-
-    bl_idname = "dyehouse.write_image"
-    bl_label = "Write to New Image"
-
-    result: StringProperty(name="Name", description="Of the new image; empty for a name", options={"SKIP_SAVE"})
-
-    @common.reporting
-    def execute(self, context):
-        """Recolor it, and show the new image where the photo was."""
-        image = common.image_of(context, self.image)
-        look = session.look(image, recipes.shown(image))
-        name = self.result or f"{writing.stem_of(image)}-{shown_name(image)}"
-        made, shares = writing.to_image(look.photo, look.prepared, name)
-        _tell(self, look, shares)
-        self.report({"INFO"}, f"New image '{made.name}'")
-
-
-class DYEHOUSE_OT_write_file(common.RegionOperator, bpy.types.Operator):
-    """Recolor the photo into a file, with its depth, color space and metadata"""
-
-    bl_idname = "dyehouse.write_file"
-    bl_label = "Write to File"
-    bl_options = {"REGISTER"}
-
-    filepath: StringProperty(name="File", description="To write", subtype="FILE_PATH", options=common.PATH)
-    overwrite: _overwrite()
-    quality: _quality()
-    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-
-    @common.reporting
-    def invoke(self, context, event):
-        """Ask for the file."""
-        image = common.image_of(context, self.image)
-        self.image = image.name
-        if not self.filepath:
-            suffix = Path(image.filepath).suffix.lower()
-            name = f"{writing.stem_of(image)}-{shown_name(image)}{suffix if suffix in _suffixes() else '.png'}"
-            self.filepath = str((writing.folder_of(image) or Path()) / name)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-    @common.reporting
-    def execute(self, context):
-        """Recolor it."""
-        image = common.image_of(context, self.image)
-        path = writing.check(common.absolute(self.filepath), image, self.overwrite)
-        look = session.look(image, recipes.shown(image))
-        quality = self.quality or image.dyehouse.quality
-        shares = writing.save(look.photo, look.prepared, path, overwrite=self.overwrite, quality=quality)
-        _tell(self, look, shares)
-        self.report({"INFO"}, f"Wrote {path}")
-
-
 def _suffixes() -> Any:
     from ...batch.files import OUTPUT_KINDS
 
@@ -109,7 +47,7 @@ def shown_name(image: bpy.types.Image) -> str:
     return settings.colorways[active].name if 0 <= active < len(settings.colorways) else "recolored"
 
 
-# --- all colorways --------------------------------------------------------------------------------------------
+# --- the work -------------------------------------------------------------------------------------------------
 
 
 class _Stopped(Exception):  # noqa: N818, no error
@@ -117,14 +55,18 @@ class _Stopped(Exception):  # noqa: N818, no error
 
 
 class _Job:
-    """Writes all colorways of a photo, one after the other.
+    """Writes colorways of a photo, one after the other.
 
     Parameters
     ----------
     image
         The photo.
-    pattern
-        Name of the files.
+    recipe
+        Of the image, checked.
+    colorways
+        What is written.
+    paths
+        The file of each.
     overwrite
         Replace files that are there.
     quality
@@ -133,22 +75,23 @@ class _Job:
     Raises
     ------
     DyehouseError
-        If there is nothing to write, or a file cannot be written.
+        If a file cannot be written.
     """
 
-    def __init__(self, image: bpy.types.Image, pattern: str, overwrite: bool, quality: int) -> None:
-        from ...core.errors import RecipeError
-        from ...core.recipe import check
-
-        recipe = recipes.recipe_of(image)
-        if not recipe.colorways:
-            raise RecipeError(f"Image '{image.name}' has no colorway: add one first.")
-        check(recipe)
-        self._colorways = recipe.colorways
-        self.paths = writing.planned(image, pattern, recipe.colorways)
-        for path in self.paths:
+    def __init__(
+        self,
+        image: bpy.types.Image,
+        recipe: "Recipe",
+        colorways: "Sequence[Colorway]",
+        paths: Sequence[Path],
+        overwrite: bool = False,
+        quality: int = 95,
+    ) -> None:
+        self._image, self._colorways, self.paths = image.session_uid, colorways, paths
+        for path in paths:
             writing.check(path, image, overwrite)
-        self._upright = cache(partial(_upright, session.begin(image, recipe)))
+        self._begun = session.begin(image, recipe)
+        self._upright = cache(partial(_upright, self._begun))
         self._options: dict[str, Any] = {"overwrite": overwrite, "quality": quality, "watch": self._watch}
         self._stop = threading.Event()
         self._share = 0.0
@@ -167,13 +110,16 @@ class _Job:
         """
         photo, found = self._upright()
         self._watch(0.0)
-        prepared = found.for_colorway(self._colorways[self.written])
+        prepared, path = found.for_colorway(self._colorways[self.written]), self.paths[self.written]
         self.warnings.update(prepared.warnings)
-        return writing.begin(photo, prepared, self.paths[self.written], **self._options)
+        complete = writing.begin(photo, prepared, path, **self._options)
+        _delivered[self._image] = writing.verified(photo, prepared, path)
+        return complete
 
     def finish(self, complete: Callable[[], Any]) -> bool:
         """Complete the file, in the main thread; tells whether there is more to do."""
-        complete()
+        shares = complete()
+        self.warnings.update(_unheld(shares))
         self.written, self._share = self.written + 1, 0.0
         return self.written < len(self.paths)
 
@@ -191,6 +137,45 @@ class _Job:
         self._share = share
         if self._stop.is_set():
             raise _Stopped
+
+
+class _ImageJob(_Job):
+    """Makes a new image of what is shown."""
+
+    def __init__(self, image: bpy.types.Image, recipe: "Recipe", name: str) -> None:
+        super().__init__(image, recipe, (), ())
+        self.paths = (Path(name),)
+        self._name = name
+        self.made = ""
+
+    def recolor_next(self) -> Callable[[], Any]:
+        """Recolor what is shown; the image is made in the main thread."""
+        self._watch(0.0)
+        look = self._begun()
+        self.warnings.update(look.prepared.warnings)
+        make = writing.begin_image(look.photo, look.prepared, self._name, self._watch)
+
+        def complete() -> Any:
+            image, shares = make()
+            self.made = image.name
+            return shares
+
+        return complete
+
+
+def _unheld(shares: "Shares") -> list[str]:
+    from ...batch.inspection import gamut_warning
+
+    return gamut_warning(shares)
+
+
+# What the file that was written last of each image (by its session_uid) shows, in words.
+_delivered: dict[int, list[str]] = {}
+
+
+def delivered(image: bpy.types.Image) -> list[str]:
+    """How near the file that was written last came to the asked colors: a sentence for each region."""
+    return _delivered.get(image.session_uid, [])
 
 
 def _upright(look: Callable[[], session.Look]) -> "tuple[Photo, Prepared]":
@@ -218,46 +203,32 @@ def progress() -> tuple[float, int, str] | None:
     return _running.job.progress() if _running else None
 
 
-class DYEHOUSE_OT_write_colorways(common.RegionOperator, bpy.types.Operator):
-    """Write every colorway to a file; Esc stops after the files that are complete"""
+class _Writing(common.RegionOperator):
+    """Runs a job: in a thread while the window goes on, or at once for scripts."""
 
-    bl_idname = "dyehouse.write_colorways"
-    bl_label = "Write All Colorways"
-    bl_options = {"REGISTER"}
-
-    pattern: StringProperty(
-        name="Output",
-        description="Name of the files with {photo} and {colorway}; empty for the panel's",
-        options={"SKIP_SAVE"},
-    )
-    overwrite: _overwrite()
-    quality: _quality()
+    report: Callable[..., None]
 
     @classmethod
     def poll(cls, context):
-        """Gray the button out while files are written, and where there is nothing to write."""
-        image = getattr(context, "edit_image", None)
+        """Gray the button out while files are written."""
         if _running is not None:
-            cls.poll_message_set("Colorways are being written; Esc stops it")
-            return False
-        if image is not None and not image.dyehouse.colorways:
-            cls.poll_message_set("The image has no colorway yet")
+            cls.poll_message_set("Files are being written; Esc stops it")
             return False
         return super().poll(context)
 
-    @common.reporting
-    def execute(self, context):
-        """Write them now."""
-        job = self._job(context)
+    def ended(self, job: _Job) -> None:
+        """Tell what was made."""
+        raise NotImplementedError
+
+    def at_once(self, job: _Job) -> None:
+        """Do the job now."""
         while job.finish(job.recolor_next()):
             pass
-        return self._ended(job)
+        self._end_well(job)
 
-    @common.reporting
-    def invoke(self, context, event):
-        """Write them in a thread, while the window goes on."""
+    def go_on(self, context: bpy.types.Context, job: _Job) -> set[str]:
+        """Do the job in a thread."""
         global _running
-        job = self._job(context)
         timer = context.window_manager.event_timer_add(_INTERVAL, window=context.window)
         _running = _Running(job, timer, _in_thread(job.recolor_next))
         context.window_manager.progress_begin(0, 100)
@@ -291,27 +262,19 @@ class DYEHOUSE_OT_write_colorways(common.RegionOperator, bpy.types.Operator):
                 running.part = _in_thread(running.job.recolor_next)
             else:
                 _end(context)
-        return {"PASS_THROUGH"} if more else self._ended(running.job)
+        if more:
+            return {"PASS_THROUGH"}
+        self._end_well(running.job)
+        return {"FINISHED"}
 
     def cancel(self, context):
         """Stop because Blender ends or opens another file."""
         _end(context)
 
-    def _job(self, context: bpy.types.Context) -> _Job:
-        image = common.image_of(context, self.image)
-        settings = image.dyehouse
-        return _Job(
-            image,
-            self.pattern or settings.output_pattern,
-            self.overwrite or settings.overwrite,
-            self.quality or settings.quality,
-        )
-
-    def _ended(self, job: _Job) -> set[str]:
+    def _end_well(self, job: _Job) -> None:
         for warning in sorted(job.warnings):
             self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"{_count(job)} written to {job.paths[0].parent}")
-        return {"FINISHED"}
+        self.ended(job)
 
     def _show(self, context: bpy.types.Context) -> None:
         found = progress()
@@ -325,6 +288,143 @@ class DYEHOUSE_OT_write_colorways(common.RegionOperator, bpy.types.Operator):
             context.window_manager.progress_update(percent)
             context.workspace.status_text_set(text)
             _redraw_sidebars()
+
+
+class DYEHOUSE_OT_write_image(_Writing, bpy.types.Operator):
+    """Recolor the photo into a new image of the .blend"""
+
+    bl_idname = "dyehouse.write_image"
+    bl_label = "Write to New Image"
+
+    result: StringProperty(name="Name", description="Of the new image; empty for a name", options={"SKIP_SAVE"})
+
+    @common.reporting
+    def execute(self, context):
+        """Make it now."""
+        self.at_once(self._job(context))
+
+    @common.reporting
+    def invoke(self, context, event):
+        """Make it while the window goes on."""
+        return self.go_on(context, self._job(context))
+
+    def _job(self, context: bpy.types.Context) -> _Job:
+        image = common.image_of(context, self.image)
+        name = self.result or f"{writing.stem_of(image)}-{shown_name(image)}"
+        return _ImageJob(image, recipes.shown(image), name)
+
+    def ended(self, job):
+        """Tell the name."""
+        self.report({"INFO"}, f"New image '{job.made}'")
+
+
+class DYEHOUSE_OT_write_file(_Writing, bpy.types.Operator):
+    """Recolor the photo into a file, with its depth, color space and metadata"""
+
+    bl_idname = "dyehouse.write_file"
+    bl_label = "Write to File"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(name="File", description="To write", subtype="FILE_PATH", options=common.PATH)
+    overwrite: _overwrite()
+    quality: _quality()
+    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    in_window: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    @common.reporting
+    def invoke(self, context, event):
+        """Ask for the file."""
+        image = common.image_of(context, self.image)
+        self.image, self.in_window = image.name, True
+        if not self.filepath:
+            suffix = Path(image.filepath).suffix.lower()
+            name = f"{writing.stem_of(image)}-{shown_name(image)}{suffix if suffix in _suffixes() else '.png'}"
+            self.filepath = str((writing.folder_of(image) or Path()) / name)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    @common.reporting
+    def execute(self, context):
+        """Recolor it: while the window goes on if a window asked for the file."""
+        from ...core.recipe import Colorway
+
+        image = common.image_of(context, self.image)
+        recipe = recipes.shown(image)
+        shown = Colorway(shown_name(image), tuple(region.target for region in recipe.regions))
+        path = common.absolute(self.filepath)
+        job = _Job(image, recipe, (shown,), (path,), self.overwrite, self.quality or image.dyehouse.quality)
+        if self.in_window:
+            return self.go_on(context, job)
+        return self.at_once(job)
+
+    def ended(self, job):
+        """Tell the file."""
+        self.report({"INFO"}, f"Wrote {job.paths[0]}")
+
+
+class DYEHOUSE_OT_write_colorways(_Writing, bpy.types.Operator):
+    """Write every colorway to a file; Esc stops after the files that are complete"""
+
+    bl_idname = "dyehouse.write_colorways"
+    bl_label = "Write All Colorways"
+    bl_options = {"REGISTER"}
+
+    pattern: StringProperty(
+        name="Output",
+        description="Name of the files with {photo} and {colorway}; empty for the panel's",
+        options={"SKIP_SAVE"},
+    )
+    overwrite: _overwrite()
+    quality: _quality()
+
+    @classmethod
+    def poll(cls, context):
+        """Gray the button out where there is nothing to write."""
+        image = getattr(context, "edit_image", None)
+        if image is not None and not image.dyehouse.colorways:
+            cls.poll_message_set("The image has no colorway yet")
+            return False
+        return super().poll(context)
+
+    @common.reporting
+    def execute(self, context):
+        """Write them now."""
+        self.at_once(self._job(context))
+
+    @common.reporting
+    def invoke(self, context, event):
+        """Write them in a thread, while the window goes on."""
+        return self.go_on(context, self._job(context))
+
+    def _job(self, context: bpy.types.Context) -> _Job:
+        image = common.image_of(context, self.image)
+        settings = image.dyehouse
+        overwrite, quality = self.overwrite or settings.overwrite, self.quality or settings.quality
+        return all_colorways(image, self.pattern or settings.output_pattern, overwrite, quality)
+
+    def ended(self, job):
+        """Tell how many."""
+        self.report({"INFO"}, f"{_count(job)} written to {job.paths[0].parent}")
+
+
+def all_colorways(image: bpy.types.Image, pattern: str, overwrite: bool, quality: int) -> _Job:
+    """The job of writing every colorway of a photo.
+
+    Raises
+    ------
+    DyehouseError
+        If there is nothing to write, or a file cannot be written.
+    """
+    from ...core.errors import RecipeError
+    from ...core.recipe import check
+
+    recipe = recipes.recipe_of(image)
+    if not recipe.colorways:
+        raise RecipeError(f"Image '{image.name}' has no colorway: add one first.")
+    check(recipe)
+    paths = writing.planned(image, pattern, recipe.colorways)
+    return _Job(image, recipe, recipe.colorways, paths, overwrite, quality)
 
 
 def _redraw_sidebars() -> None:

@@ -9,8 +9,9 @@ import pytest
 
 from dyehouse.addon import images
 from dyehouse.addon.operators import write
-from dyehouse.batch import files
+from dyehouse.batch import files, verification
 from dyehouse.batch.cli import main
+from dyehouse.core.swatches import parse_target
 
 pytestmark = pytest.mark.usefixtures("blender")
 
@@ -47,6 +48,19 @@ def test_what_is_shown_is_written(image: bpy.types.Image, tmp_path: Path) -> Non
     assert (tmp_path / "low.jpg").read_bytes() == by_command_line(
         image, tmp_path / "cli-low.jpg", "#1F4E79", "--quality", "60"
     )
+
+
+def test_what_was_written_is_read_back_and_told(image: bpy.types.Image, tmp_path: Path) -> None:
+    assert write.delivered(image) == []
+    output = tmp_path / "out.png"
+    assert bpy.ops.dyehouse.write_file(image=image.name, filepath=str(output)) == {"FINISHED"}
+    (told,) = write.delivered(image)
+    assert told.startswith("Delivered ")
+    assert float(told.split()[1]) < 1
+    # The file really has that color, and not the one that it had.
+    found = verification.verify(output, (22, 26), parse_target(TARGET))
+    before = verification.verify(bpy.path.abspath(image.filepath), (22, 26), parse_target(TARGET))
+    assert found.ciede2000 < 2 < before.ciede2000
 
 
 def test_a_new_image_is_written(image: bpy.types.Image, tmp_path: Path) -> None:
@@ -125,7 +139,7 @@ def test_a_photo_without_target_or_colorway_says_so(photo: Any, tmp_path: Path) 
 
 
 def test_stopping_leaves_whole_files_and_no_others(image: bpy.types.Image, tmp_path: Path) -> None:
-    job = write._Job(image, str(tmp_path / "{colorway}.tif"), overwrite=False, quality=95)
+    job = write.all_colorways(image, str(tmp_path / "{colorway}.tif"), overwrite=False, quality=95)
     assert job.finish(job.recolor_next())
     done, total, text = job.progress()
     assert (done, total) == (1, 2)
@@ -139,7 +153,7 @@ def test_stopping_leaves_whole_files_and_no_others(image: bpy.types.Image, tmp_p
 
 
 def test_stopping_within_a_file_leaves_none_of_it(image: bpy.types.Image, tmp_path: Path) -> None:
-    job = write._Job(image, str(tmp_path / "{colorway}.tif"), overwrite=False, quality=95)
+    job = write.all_colorways(image, str(tmp_path / "{colorway}.tif"), overwrite=False, quality=95)
     look = job._upright
     shares = []
 

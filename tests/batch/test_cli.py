@@ -15,6 +15,7 @@ from dyehouse.batch import files
 from dyehouse.batch.cli import main
 from dyehouse.core import Picture, analyze, gamut, transfer
 from dyehouse.core.colorspace import SPACES
+from dyehouse.core.neighborhood import dilate, erode
 
 TARGET = (0.06, 0.14, 0.42)
 TARGET_TEXT = "rgb(0.06,0.14,0.42)"
@@ -369,6 +370,22 @@ def test_glossy_click_is_warned_of(run, shop, product):
     y, x = np.unravel_index(np.argmin(np.where(scene.mask == 1, np.abs(scene.gloss - 0.2), 9)), scene.mask.shape)
     _, said, _ = run("inspect", photo, "--reference", f"{x},{y}", "--target", TARGET_TEXT)
     assert re.search(r"Warning: The reference pixel is glossy \(about \d+% of the white\)", said)
+
+
+@pytest.mark.parametrize("how", [["--spill"], ["--region", "spill=yes"]])
+def test_spill_recolors_the_rim_that_a_tight_mask_leaves(run, shop, how):
+    tight = shop.folder / "tight.png"
+    Image.fromarray(erode(shop.mask == 1, 2).astype(np.uint8) * 255).save(tight)
+    asked = [shop.photo, "--click", shop.click, "--mask", tight, "--target", TARGET_TEXT]
+    made = {}
+    for name, more in (("plain", []), ("spilled", how)):
+        run("recolor", *asked, *more, "-o", shop.folder / f"{name}.png")
+        made[name] = np.asarray(Image.open(shop.folder / f"{name}.png"))[..., :3]
+    rim = (shop.mask == 1) & ~erode(shop.mask == 1, 2)
+    assert (made["plain"][rim] == shop.codes[rim]).all()
+    assert (made["spilled"][rim] != shop.codes[rim]).any(axis=1).mean() > 0.9
+    far = ~dilate(shop.mask == 1, 6)
+    assert np.abs(made["spilled"][far].astype(int) - shop.codes[far]).max() <= 3
 
 
 # --- bad input: exit code 2, one sentence, nothing changed ------------------------------------------------------

@@ -300,7 +300,7 @@ def find(area, name, across=0.6):
     pages = [*range(_page, _PAGES), *range(_page)]  # from where it is scrolled to
     for page in ([remembered[0]] if remembered else []) + pages:
         yield from _turn(area, page)
-        heights = list(range(ui.y + ui.height - 8, ui.y, -10))  # a button is 20 high
+        heights = list(range(ui.y + ui.height - 8, ui.y + 24, -10))  # a button is 20 high
         if remembered:
             heights.insert(0, remembered[1])
         for y in heights:

@@ -7,6 +7,7 @@ import gui_kit as gui
 import numpy as np
 
 SAUCER, COFFEE, CARD = (120, 250), (272, 151), (395, 90)
+_PICKER = (24, 24, 24)  # background of Blender's color picker
 TARGETS = {"Petrol": "#1F5E66", "Sand": "#C8B48C", "Black": "#1E1E20"}
 
 
@@ -104,9 +105,13 @@ def a_product_is_recolored_with_the_mouse():
     before, color_before = (yield from _seen(area, region, image)), tuple(product.target.color)
     assert np.abs(before.astype(int) - codes).max() > 50, "the preview shows nothing"
     x, y = yield from gui.find(area, "target.color", across=0.7)
+    closed = gui.screen()
     yield from gui.click(x, y)
     yield gui.redrawn
-    wheel = x, y + 259  # the middle of the picker's wheel, above the button
+    opened = gui.screen()
+    rows, columns = np.nonzero((opened != closed).any(-1) & (opened == _PICKER).all(-1))
+    assert len(rows) > 10000, "the color picker did not open"
+    wheel = columns.min() + 92, gui.main_window().height - 1 - rows.min() - 91  # its middle
     shown = []
 
     def midway():
