@@ -55,7 +55,7 @@ MASKS = (
 )
 
 MEANINGS = (
-    ("reference", "Color at the Reference", "The reference pixel shall have exactly the target color"),
+    ("reference", "Color at the Reference", "A matte reference pixel shall have exactly the target color"),
     ("product", "Product Reflectance", "The product shall have the target's reflectance, in the light of the photo"),
 )
 
