@@ -13,7 +13,7 @@ import argparse
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -155,8 +155,9 @@ def outcome(trials: Iterable[Trial]) -> Outcome:
             if model == "dichromatic":
                 coefficients = analysis.A[trial.where], analysis.B[trial.where]
         figures.append([*row, *_coefficient_errors(trial, v, *coefficients)])
-    mean = [float(f) for f in np.mean(figures, axis=0)]
-    return Outcome(*mean, Counter(deeds).most_common(1)[0][0])  # type: ignore[arg-type]
+    names = [each.name for each in fields(Outcome)][:-1]
+    means = dict(zip(names, (float(f) for f in np.mean(figures, axis=0)), strict=True))
+    return Outcome(does=Counter(deeds).most_common(1)[0][0], **means)
 
 
 def _coefficient_errors(trial: Trial, v: NDArray, a: NDArray, b: NDArray) -> tuple[float, float]:
