@@ -388,4 +388,6 @@ def figure(name, area=None, region=None):
     if part is not None:
         left, top = _place(part.x, part.y + part.height - 1)
         crop = ["-crop", f"{part.width}x{part.height}+{left}+{top}", "+repage"]
-    subprocess.run(["import", "-window", "root", *crop, "-strip", str(Path(target) / f"{name}.png")], check=True)
+    subprocess.run(
+        ["import", "-window", "root", *crop, "-strip", "-quality", "88", str(Path(target) / f"{name}.jpg")], check=True
+    )

@@ -88,7 +88,7 @@ def a_product_is_recolored_with_the_mouse():
     yield gui.redrawn
     gui.move(*gui.at(region, image, *SAUCER))
     yield from gui.settle()
-    gui.figure("blender-loupe", area)
+    gui.figure("blender-reference", area)
     yield from gui.click(*gui.at(region, image, *SAUCER))
     yield gui.idle
     assert tuple(product.reference) == SAUCER, tuple(product.reference)
