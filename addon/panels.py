@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 _PIXELS_PER_LETTER = 7.0
 
+# CIEDE2000 under which a compromise is not worth a word.
+_SEEN = 0.05
+
 
 def photo_shown(context: bpy.types.Context) -> bpy.types.Image | None:
     """The image of the Image Editor at hand."""
@@ -234,6 +237,7 @@ class DYEHOUSE_PT_target(_Part, bpy.types.Panel):
             problem = recipes.problem_of(region.target, image)
             if problem:
                 sentences(layout, context, problem, "ERROR")
+        self._gamut(context, layout, image)
         layout.prop(region, "meaning")
         if region.meaning == "product":
             layout.prop(region, "source")
@@ -245,6 +249,21 @@ class DYEHOUSE_PT_target(_Part, bpy.types.Panel):
             layout.prop(asked, "light_temperature")
         elif kind == "COLOR":
             layout.prop(asked, "light_color")
+
+
+    def _gamut(self, context, layout, image):
+        from ..core import gamut
+
+        look, index = session.last(image), image.dyehouse.active_region
+        if look is None or index >= len(look.prepared.analyses):
+            return
+        space = look.photo.space
+        nearest = gamut.nearest(look.prepared.target(index), space)
+        if nearest.difference > _SEEN:
+            row = layout.row()
+            row.label(icon_value=swatches.icon_of_color(recipes.codes(nearest.linear, space)))
+            text = f"{space.name} cannot hold this color: the nearest that it can is {nearest.difference:.1f} away"
+            sentences(row, context, text)
 
 
 class DYEHOUSE_PT_swatches(_Part, bpy.types.Panel):

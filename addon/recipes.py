@@ -335,6 +335,15 @@ def from_rec709(color: "NDArray") -> tuple[float, ...]:
     return _shown(color, LINEAR_SRGB)
 
 
+def codes(color: "NDArray", space: "RGBSpace") -> tuple[float, ...]:
+    """Linear RGB (3,) of a space as sRGB codes 0..1, for icons."""
+    import numpy as np
+
+    from ..core.colorspace import LINEAR_SRGB, SRGB
+
+    return tuple(SRGB.curve.encode(np.clip(between(space, LINEAR_SRGB, color), 0, 1)))
+
+
 def found_color(image: bpy.types.Image, index: int) -> tuple[float, ...]:
     """The reference color of a region as Blender shows it; black while it is not known."""
     from . import session

@@ -20,7 +20,7 @@ from .errors import ImageError, ReferenceColorError, WhiteError
 from .materials import find_materials
 from .mixture import MODELS as _MODELS
 from .mixture import Mixture
-from .picture import Picture, as_mask, as_weights
+from .picture import Picture, as_mask, as_weights, bounding_box
 from .reference import DARK, Reference, matte_at, matte_reference
 from .selection import Evidence, choose, noise_across
 
@@ -283,10 +283,19 @@ class Analysis:
     def _looked_at(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Rows and columns of pixels all over the region, well inside it."""
         height, width = self.picture.shape
-        cover = np.ones((height, width), np.float32) if self.selection is None else as_weights(self.selection)
-        rows, columns = np.nonzero(cover > 0.95 * min(1.0, float(cover.max())))
-        step = max(1, len(rows) // _LOOKED_AT)
-        return rows[step // 2 :: step], columns[step // 2 :: step]
+        box = (slice(0, height), slice(0, width)) if self.selection is None else bounding_box(self.selection)
+        step = max(1, int(np.sqrt((box[0].stop - box[0].start) * (box[1].stop - box[1].start) / _LOOKED_AT)))
+        while True:
+            rows, columns = np.mgrid[
+                box[0].start + step // 2 : box[0].stop : step, box[1].start + step // 2 : box[1].stop : step
+            ].reshape(2, -1)
+            if self.selection is None:
+                return rows, columns
+            cover = as_weights(self.selection[rows, columns])
+            inside = cover > 0.95 * min(1.0, float(cover.max(initial=0.0)))
+            if step == 1 or 2 * np.count_nonzero(inside) >= _LOOKED_AT:
+                return rows[inside], columns[inside]
+            step //= 2  # the region fills little of its box
 
     def thinned(self, step: int) -> Analysis:
         """Return the same findings on every step-th pixel of every step-th row, for small maps of A, B and residual."""

@@ -38,6 +38,8 @@ def draws_every_panel():
     for mask in ("WHOLE", "ALPHA", "IMAGE", "SPLINE", "CRYPTOMATTE", "FILE", "CLICK"):
         image.dyehouse.regions[1].mask_source = mask
         yield gui.redrawn
+    bpy.ops.dyehouse.set_target(image=image.name, text="lch(60, 130, 140)")  # no screen can show it
+    bpy.ops.dyehouse.use_swatch(image=image.name, library="ColorChecker", index=3)
     for name in PANELS:
         assert hasattr(bpy.types, f"DYEHOUSE_PT_{name}"), name
     yield gui.redrawn
