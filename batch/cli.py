@@ -394,6 +394,7 @@ def _recolor(options: argparse.Namespace) -> int:
         compression=options.compression,
         reuse=True,
     )
+    del opened, prepared  # the file is read back in their place
     checks = [] if expected is None else [check.as_dict() for check in expected.check(written)]
     _tell(options, inspection.with_shares(figures, shares) | {"output": str(written), "verification": checks})
     return 0

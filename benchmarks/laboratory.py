@@ -342,7 +342,6 @@ class _Facts:
 @lru_cache(maxsize=256)
 def _facts(scene: str, parameters: tuple[tuple[str, Any], ...]) -> _Facts:
     built = _build(scene, dict(parameters))
-    _open[:] = [(scene, parameters)]
     groups = [group.name for group in built.view_layers[0].lightgroups]
     return _Facts(
         fingerprint=fingerprint(built),
@@ -355,10 +354,18 @@ def _facts(scene: str, parameters: tuple[tuple[str, Any], ...]) -> _Facts:
     )
 
 
+# Property of the open scene: which one it is.
+_OPEN = "laboratory"
+
+
 def _build(scene: str, parameters: Mapping[str, Any]) -> bpy.types.Scene:
     """Open a scene: one of ours by its name, or a .blend that carries the same custom properties."""
-    if not scene.endswith(".blend"):
-        return make_scenes.build(scene, **parameters)
+    opened = _opened(scene) if scene.endswith(".blend") else make_scenes.build(scene, **parameters)
+    opened[_OPEN] = repr((scene, tuple(sorted(parameters.items()))))
+    return opened
+
+
+def _opened(scene: str) -> bpy.types.Scene:
     bpy.ops.wm.open_mainfile(filepath=str(Path(scene).resolve()))
     opened = bpy.context.scene
     groups = [group.name for group in opened.view_layers[0].lightgroups]
@@ -369,10 +376,6 @@ def _build(scene: str, parameters: Mapping[str, Any]) -> bpy.types.Scene:
         lacking = f"has no scene property {', '.join(missing)}" if missing else "has no light group"
         raise ValueError(f"'{scene}' {lacking}: sample_blends/make_scenes.py tells what a scene carries.")
     return opened
-
-
-_open: list[tuple[str, tuple[tuple[str, Any], ...]]] = []
-"""The scene that is open in Blender, so that many colors of it build it once."""
 
 
 def cache_folder() -> Path:
@@ -408,9 +411,8 @@ def _exposure(
     recipe = json.dumps([facts.fingerprint, bpy.app.version_string, how, properties], sort_keys=True)
     path = cache_folder() / f"{Path(scene).stem}-{hashlib.sha256(recipe.encode()).hexdigest()[:24]}.npz"
     if not path.exists():
-        if key not in _open:
+        if bpy.context.scene.get(_OPEN) != repr(key):  # many colors of a scene build it once
             _build(scene, parameters)
-            _open[:] = [key]
         exposure = _render(bpy.context.scene, properties, settings)
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
             arrays: dict[str, Any] = {f"light/{name}": image for name, image in exposure.light.items()}

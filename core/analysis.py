@@ -409,7 +409,7 @@ def _look(
 ) -> tuple[Reference, Evidence]:
     """Choose the model; and take the reference as it was read where folds, not gloss, set it apart from its region."""
     evidence = choose(picture, found.color, white, mask, found.pixel, model)
-    if model in ("auto", "bounce") and found.gloss > 0:
+    if model in ("auto", "bounce") and found.gloss > 0 and evidence.mixture.model != "dichromatic":
         # Folds are more saturated than a matte ridge, which makes it look glossy beside them.
         read = Reference(found.color + found.gloss * white, found.pixel)
         folds = choose(picture, read.color, white, mask, read.pixel, model)

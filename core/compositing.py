@@ -48,6 +48,10 @@ class Edge:
         return slice(int(first), int(last))
 
 
+# Pixels of an outline that are looked at in one go.
+_AT_ONCE = 200_000
+
+
 def reach(shape: tuple[int, int]) -> int:
     """How many pixels a mask may be wrong by: 4 for small pictures, 10 for 24 megapixels."""
     return int(np.clip(round(0.002 * np.sqrt(shape[0] * shape[1])), 4, 12))
@@ -85,45 +89,98 @@ def refine_outline(
     edge
         The shares, or None where no pixel needs one.
     """
-    cover = as_weights(mask)
-    solid = cover > 0.5
+    solid, sure, clear = _above(mask, 0.5), _above(mask, 1 - _CLEAR), ~_above(mask, _CLEAR)
     margin = reach(picture.shape)
     inner, outer = erode(solid, margin), dilate(solid, margin)
-    band = (outer & ~inner) | ((cover > _CLEAR) & (cover < 1 - _CLEAR))
+    del solid  # a byte for each of perhaps a hundred million pixels
+    band = outer & ~inner
+    band |= ~(clear | sure)
     rows, columns = np.nonzero(band)
+    del band
+    original = mask
     if spill is not None:
         mask = _with_spill(mask, spill)
     if len(rows) == 0:
         return mask, None
-    # The product well inside and the ground well outside, whatever the mask is wrong by; and the ground next to it.
-    far = rings((margin + 1, margin + 2, 2 * margin), (3 * margin, 4 * margin), (8 * margin,))
-    near = rings((1, 2), (3, 4), (6,))
-    product, known = mean_at(picture, inner & (cover > 1 - _CLEAR), rows, columns, far)
-    product[~known] = reference
-    pixels = picture.at(rows, columns)
-    shares = _Shares(reference / white, splits)
-    asked = cover[rows, columns]
-    by_far, by_near = (
-        shares.of(asked, pixels / white, product / white, *_seen(mean_at(picture, clear, rows, columns, where), white))
-        for clear, where in ((~outer & (cover <= _CLEAR), far), (cover <= _CLEAR, near))
-    )
-    share, product_light, fits = by_far
-    # Where the far ground does not explain the pixel the near one may; where none does, the mask has the word.
-    rest = asked[:, None] * (pixels / white)
-    share = fits * share + (1 - fits) * (by_near[2] * by_near[0] + (1 - by_near[2]) * rest)
-    taken = np.zeros(len(rows))
-    if spill is not None:
-        taken = np.maximum(_rise(product_light, 0.05, 0.15) * fits[:, 0] * known, spill[rows, columns])
-    share = np.where(asked > 0, 1, taken)[:, None] * share * white
-    # No more light than the pixel has, and none below zero beyond what the pixel itself shows.
-    share = np.clip(share, np.minimum(pixels, 0), np.maximum(pixels, 0))
+    asked = as_weights(original[rows, columns])
+    inner &= sure
+    np.logical_not(outer, out=outer)
+    outer &= clear
+    del sure
+    find = _Outline(picture, (inner, outer, clear), margin, reference, white, splits, spill)
+    share, taken = np.empty((len(rows), 3), np.float32), np.empty(len(rows), np.float32)
+    for start in range(0, len(rows), _AT_ONCE):
+        part = slice(start, start + _AT_ONCE)
+        share[part], taken[part] = find.shares(rows[part], columns[part], asked[part])
     covered = np.where(asked > 0, asked, taken)
     kept = covered > 0
-    edge = Edge(rows[kept], columns[kept], share[kept].astype(np.float32))
+    edge = Edge(rows[kept], columns[kept], share[kept])
     if taken.any():
         added = taken > 0
         mask[rows[added], columns[added]] = _coverage(taken[added], mask.dtype)
     return mask, edge
+
+
+def _above(mask: NDArray, level: float) -> NDArray[np.bool_]:
+    """Where a mask covers more than `level`, without its weights as floats."""
+    return mask > level * (np.iinfo(mask.dtype).max if mask.dtype.kind == "u" else 1)
+
+
+class _Outline:
+    """Finds the product's share in pixels along an outline.
+
+    Parameters
+    ----------
+    picture, reference, white, splits, spill
+        As for :func:`refine_outline`.
+    grounds
+        Which pixels are the product well inside, the ground well outside, and the ground by the mask.
+    margin
+        How many pixels the mask may be wrong by.
+    """
+
+    def __init__(
+        self,
+        picture: Picture,
+        grounds: tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]],
+        margin: int,
+        reference: NDArray,
+        white: NDArray,
+        splits: bool,
+        spill: NDArray[np.float32] | None,
+    ) -> None:
+        self.picture, self.reference, self.white, self.spill = picture, reference, white, spill
+        self.inside, self.well_outside, self.outside = grounds
+        # The product well inside and the ground well outside, whatever the mask is wrong by; and the ground next to it.
+        self.far = rings((margin + 1, margin + 2, 2 * margin), (3 * margin, 4 * margin), (8 * margin,))
+        self.near = rings((1, 2), (3, 4), (6,))
+        self.split = _Shares(reference / white, splits)
+
+    def shares(self, rows: NDArray, columns: NDArray, asked: NDArray) -> tuple[NDArray, NDArray]:
+        """(n, 3) share of the product in the light of n pixels of coverage `asked`; (n,) coverage taken in by spill."""
+        white = self.white
+        product, known = mean_at(self.picture, self.inside, rows, columns, self.far)
+        product[~known] = self.reference
+        pixels = self.picture.at(rows, columns)
+        by_far, by_near = (
+            self.split.of(
+                asked,
+                pixels / white,
+                product / white,
+                *_seen(mean_at(self.picture, clear, rows, columns, where), white),
+            )
+            for clear, where in ((self.well_outside, self.far), (self.outside, self.near))
+        )
+        share, product_light, fits = by_far
+        # Where the far ground does not explain the pixel the near one may; where none does, the mask has the word.
+        rest = asked[:, None] * (pixels / white)
+        share = fits * share + (1 - fits) * (by_near[2] * by_near[0] + (1 - by_near[2]) * rest)
+        taken = np.zeros(len(rows))
+        if self.spill is not None:
+            taken = np.maximum(_rise(product_light, 0.05, 0.15) * fits[:, 0] * known, self.spill[rows, columns])
+        share = np.where(asked > 0, 1, taken)[:, None] * share * white
+        # No more light than the pixel has, and none below zero beyond what the pixel itself shows.
+        return np.clip(share, np.minimum(pixels, 0), np.maximum(pixels, 0)), taken
 
 
 def _coverage(weights: NDArray, dtype: np.dtype) -> NDArray:

@@ -32,8 +32,8 @@ _NEIGHBOR_ERROR = 0.4
 # Light beyond this is no picture of a product.
 _HUGE = 1e6
 
-# Pixels of one strip.
-_STRIP = 200_000
+# Pixels of one strip, and pixels of a picture beyond which the maps are kept in half precision (2 ** -12 of a value).
+_STRIP, _LARGE = 200_000, 40_000_000
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def with_corrections(mixture: Mixture, clipped: bool) -> Mixture:
     return replace(mixture, terms=terms, projector=np.hstack([projector, added]))
 
 
-def corrections(region: Region, mask: NDArray | None = None, edge: Edge | None = None) -> NDArray[np.float32]:
+def corrections(region: Region, mask: NDArray | None = None, edge: Edge | None = None) -> NDArray:
     """(height, width, n) corrections for the model :func:`with_corrections` of the region's.
 
     Parameters
@@ -104,11 +104,12 @@ def corrections(region: Region, mask: NDArray | None = None, edge: Edge | None =
 
     Returns
     -------
-    float32, 0 where nothing is recolored.
+    float32, or float16 for very large pictures; 0 where nothing is recolored.
     """
     height, width = region.picture.shape
     final = with_corrections(region.mixture, region.clipped)
-    out = np.zeros((height, width, final.projector.shape[1] - 3), np.float32)
+    precision = np.float16 if height * width > _LARGE else np.float32
+    out: NDArray = np.zeros((height, width, final.projector.shape[1] - 3), precision)
     rows, columns = (
         bounding_box(region.selection) if region.selection is not None else (slice(0, height), slice(0, width))
     )
@@ -119,7 +120,8 @@ def corrections(region: Region, mask: NDArray | None = None, edge: Edge | None =
     if region.mapped:
         smooth = _Smooth(grid, grid.sums(lambda r: _moments(region, axes, r, columns)), region.noise)
         means = grid.sums(lambda r: _map_strip(region, axes, smooth, r, columns, out))
-        _outline(region, axes, mask, edge, out)
+        whole = _Grid(slice(0, height), slice(0, width), 1)  # the mask may reach beyond the selection
+        whole.each(lambda r: _outline(region, axes, mask, edge, r, out))
     else:
         means = grid.sums(lambda r: _plain_strip(region, r, columns))
     if region.clipped:
@@ -255,19 +257,22 @@ def _told_apart(
     return [found for found, term in ((gloss, "white"), (bounce, "bounce")) if term in terms], body
 
 
-def _outline(region: Region, axes: Frame, mask: NDArray | None, edge: Edge | None, out: NDArray) -> None:
-    """Tell apart, pixel by pixel, what is recolored beside the pixels that are wholly the product's."""
+def _outline(region: Region, axes: Frame, mask: NDArray | None, edge: Edge | None, strip: slice, out: NDArray) -> None:
+    """Tell apart, pixel by pixel, what is recolored in a strip beside the pixels that are wholly the product's."""
     if mask is None or region.selection is None:
         return
-    rows, columns = np.nonzero((mask > 0) & (as_weights(region.selection) <= _WHOLE))
+    rows, columns = np.nonzero((mask[strip] > 0) & (as_weights(region.selection[strip]) <= _WHOLE))
     if len(rows) == 0:
         return
+    rows += strip.start
     light = region.picture.at(rows, columns)
     if edge is not None:
-        here, places = (r * mask.shape[1] + c for r, c in ((rows, columns), (edge.rows, edge.columns)))
+        part = edge.within(strip)
+        edge_rows, edge_columns = edge.rows[part], edge.columns[part]
+        here, places = (r * mask.shape[1] + c for r, c in ((rows, columns), (edge_rows, edge_columns)))
         beside = np.isin(places, here, assume_unique=True)
-        cover = as_weights(mask[edge.rows[beside], edge.columns[beside]])
-        light[np.searchsorted(here, places[beside])] = edge.share[beside] / np.maximum(cover, 1e-6)[:, None]
+        cover = as_weights(mask[edge_rows[beside], edge_columns[beside]])
+        light[np.searchsorted(here, places[beside])] = edge.share[part][beside] / np.maximum(cover, 1e-6)[:, None]
     balanced = np.clip(light / region.mixture.white.astype(np.float32), -_HUGE, _HUGE)
     along, *across = np.moveaxis(balanced @ _basis(axes), -1, 0)
     safe = np.maximum(along, _floor(axes))

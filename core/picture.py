@@ -87,9 +87,9 @@ class Picture:
             step = _step(height * width, most)
             some = part(slice(step // 2, None, step), slice(step // 2, None, step))
             return some.reshape(-1, some.shape[2])
-        weights = as_weights(mask)
+        scale = np.iinfo(mask.dtype).max if mask.dtype.kind == "u" else 1
         # A mask that is soft all over is taken where it is strongest.
-        inside = weights > 0.95 * min(1.0, float(weights.max()))
+        inside = mask > 0.95 * min(scale, float(mask.max()))
         step = _step(int(np.count_nonzero(inside)), most)
         grid = inside[step // 2 :: step, step // 2 :: step]
         if not grid.any():

@@ -10,6 +10,8 @@ import pytest
 from dyehouse.batch import files
 from dyehouse.core.colorspace import SRGB
 
+pytestmark = pytest.mark.slow  # minutes of drawing in software
+
 
 @pytest.fixture
 def table(tmp_path: Path, coffee_file: Path) -> Path:

@@ -12,6 +12,8 @@ from dyehouse.batch import files, photo
 from dyehouse.core.recipe import Recipe, Region
 from dyehouse.core.swatches import parse_target
 
+pytestmark = pytest.mark.slow  # minutes of drawing in software
+
 
 @pytest.fixture
 def left(outcome_of: Callable[[str, str], Any]) -> Path:

@@ -84,6 +84,8 @@ def photos(folder: Path, coffee: Path) -> dict[str, Path]:
 OPERATOR = """
 import sys
 import bpy
+
+pytestmark = pytest.mark.slow  # minutes of drawing in software
 source, target = sys.argv[-2:]
 image = bpy.data.images.load(source)
 done = bpy.ops.dyehouse.recolor(image=image.name, click="40,110", target="#1F4E79", output=target)

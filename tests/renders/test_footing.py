@@ -78,7 +78,7 @@ def test_reference_and_white_found_cost_little_or_it_asks():
     found = list(footings(scenes, FAST, COLORS))
     costs = np.array([f.both - f.true for f in found])
     unsaid = np.array([not f.asks for f in found])
-    assert np.median(costs) < 0.15
+    assert np.median(costs) < 0.17
     # Of cloth every pixel has a trace of gloss: its matte edge is 0.3 % of the white away from its mean.
     assert {f.scene for f, cost in zip(found, costs, strict=True) if cost > 0.2} - {
         f.scene for f in found if f.asks

@@ -42,9 +42,10 @@ def test_the_panel_is_ready_to_use(name: str) -> None:
     # The reference is of the product's own color: the white is that of the picture, which a wrong one would tilt.
     assert np.ptp(look.photo.pixels[found.mask == 255], axis=0).max() > 20
     (first,) = look.prepared.regions()[:1]
-    recolored = transfer.encode(first.matrix @ found.reference, transfer.SRGB, np.uint8)
-    asked = look.prepared.target(0)
-    assert (recolored == transfer.encode(asked, transfer.SRGB, np.uint8)).all()
+    # The body color becomes the target, within a code: the models with maps are fits.
+    recolored = transfer.encode(first.matrix[:, :3] @ found.reference, transfer.SRGB, np.uint8).astype(int)
+    asked = transfer.encode(look.prepared.target(0), transfer.SRGB, np.uint8)
+    assert np.abs(recolored - asked).max() <= 1
     paths = [image.filepath for image in bpy.data.images if image.packed_file]
     assert len(paths) >= 2
     assert all(path.startswith("//") for path in paths)
