@@ -20,7 +20,7 @@ from .errors import ImageError, ReferenceColorError, WhiteError
 from .materials import find_materials
 from .mixture import MODELS as _MODELS
 from .mixture import Mixture
-from .picture import Picture, as_mask, as_weights, bounding_box
+from .picture import Picture, as_mask, as_weights, bounding_box, coverage
 from .reference import DARK, Reference, matte_at, matte_reference
 from .selection import Evidence, choose, noise_across
 
@@ -330,9 +330,7 @@ class Analysis:
             "residual_p95": float(np.quantile(left, 0.95)),
             "clipped_share": float((pixels[:, :3].max(axis=1) >= clip).mean()),
             "evidence": {name: float(value) for name, value in self.evidence.figures.items()},
-            "covered_share": 1.0
-            if self.selection is None
-            else float(as_weights(self.selection).mean(dtype=np.float64)),
+            "covered_share": 1.0 if self.selection is None else coverage(self.selection),
             "warnings": list(self.warnings),
         }
 

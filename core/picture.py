@@ -173,6 +173,11 @@ def as_mask(mask: ArrayLike | None, shape: tuple[int, int]) -> NDArray | None:
     return m
 
 
+def coverage(mask: NDArray) -> float:
+    """Mean coverage of a mask, 0..1."""
+    return float(mask.mean(dtype=np.float64)) / (np.iinfo(mask.dtype).max if mask.dtype.kind == "u" else 1)
+
+
 def as_weights(mask: NDArray) -> NDArray[np.float32]:
     """Coverage of a checked mask (or a part of one) as float32 in 0..1."""
     if mask.dtype.kind == "u":

@@ -1,5 +1,7 @@
 """The live preview: what is on the screen is what the core makes of the photo, within one code."""
 
+from pathlib import Path
+
 import bpy
 import gui_kit as gui
 import numpy as np
@@ -88,7 +90,7 @@ def _same_as_written(image, region):
 
     yield from ready(image)
     preview, look = gui.screen(), addon()[2].look(image)
-    path = gui.folder / f"written-{image.name}"
+    path = gui.folder / f"written-{image.session_uid}-{Path(image.filepath).name or image.name}"
     photos.save(look.photo, look.prepared, path, force=True)
     written = bpy.data.images.load(str(path))
     written.colorspace_settings.name = image.colorspace_settings.name
