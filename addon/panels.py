@@ -250,7 +250,6 @@ class DYEHOUSE_PT_target(_Part, bpy.types.Panel):
         elif kind == "COLOR":
             layout.prop(asked, "light_color")
 
-
     def _gamut(self, context, layout, image):
         from ..core import gamut
 

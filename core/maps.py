@@ -32,8 +32,9 @@ _NEIGHBOR_ERROR = 0.4
 # Light beyond this is no picture of a product.
 _HUGE = 1e6
 
-# Pixels of one strip, and pixels of a picture beyond which the maps are kept in half precision (2 ** -12 of a value).
-_STRIP, _LARGE = 200_000, 40_000_000
+# Pixels of one strip, and pixels of an 8-bit picture beyond which its maps are kept in half precision: 2 ** -12 of a
+# value, less than half a step of the codes.
+_STRIP, _LARGE = 200_000, 16_000_000
 
 
 @dataclass(frozen=True)
@@ -104,11 +105,12 @@ def corrections(region: Region, mask: NDArray | None = None, edge: Edge | None =
 
     Returns
     -------
-    float32, or float16 for very large pictures; 0 where nothing is recolored.
+    float32, or float16 for large 8-bit pictures; 0 where nothing is recolored.
     """
     height, width = region.picture.shape
     final = with_corrections(region.mixture, region.clipped)
-    precision = np.float16 if height * width > _LARGE else np.float32
+    coarse = region.picture.pixels.dtype == np.uint8 and height * width > _LARGE
+    precision = np.float16 if coarse else np.float32
     out: NDArray = np.zeros((height, width, final.projector.shape[1] - 3), precision)
     rows, columns = (
         bounding_box(region.selection) if region.selection is not None else (slice(0, height), slice(0, width))
