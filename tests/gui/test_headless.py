@@ -11,6 +11,8 @@ import pytest
 from dyehouse.batch import files
 from dyehouse.core.colorspace import SRGB
 
+pytestmark = pytest.mark.slow  # minutes of drawing in software
+
 STATE = """
 import sys
 print("heavy", sorted({"numpy", "OpenImageIO", "rich"} & set(sys.modules)))
@@ -85,7 +87,6 @@ OPERATOR = """
 import sys
 import bpy
 
-pytestmark = pytest.mark.slow  # minutes of drawing in software
 source, target = sys.argv[-2:]
 image = bpy.data.images.load(source)
 done = bpy.ops.dyehouse.recolor(image=image.name, click="40,110", target="#1F4E79", output=target)
