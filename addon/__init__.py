@@ -1,5 +1,7 @@
 """The Blender side: everything that touches bpy, and nothing else."""
 
+from types import ModuleType
+
 from . import (
     background,
     command,
@@ -14,6 +16,7 @@ from . import (
     swatches,
     thumbnails,
 )
+from .operators import catalog as catalog_operators
 from .operators import colorways as colorway_operators
 from .operators import compositor, photo, pick, recipe, recolor, regions, texture, write
 from .operators import swatches as swatch_operators
@@ -32,6 +35,7 @@ _PARTS = (
     recolor,
     colorway_operators,
     write,
+    catalog_operators,
     recipe,
     swatches,
     swatch_operators,
@@ -44,13 +48,17 @@ _PARTS = (
 )
 
 
+_registered: list[ModuleType] = []
+
+
 def register() -> None:
     """Register every part, in order."""
     for part in _PARTS:
         part.register()
+        _registered.append(part)
 
 
 def unregister() -> None:
-    """Unregister every part, in reverse order."""
-    for part in reversed(_PARTS):
-        part.unregister()
+    """Unregister what is registered, in reverse order; a second time in a row, that is nothing."""
+    while _registered:
+        _registered.pop().unregister()

@@ -83,6 +83,13 @@ class Worker[T]:
             raise thing.with_traceback(None)
         return thing
 
+    def take(self, key: Hashable) -> T | None:
+        """As `found`, and keep it no longer."""
+        found = self.found(key)
+        with self._lock:
+            self._made.pop(key, None)
+        return found
+
     def busy(self) -> bool:
         """Whether something is being made."""
         return self._at_work

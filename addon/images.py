@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from . import background
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -131,7 +133,7 @@ def space_in_blender(image: bpy.types.Image) -> "RGBSpace":
     return space_named(SPACE_NAMES.get(told, "srgb"))
 
 
-def version_of(image: bpy.types.Image, hurry: bool = False) -> tuple[object, ...]:
+def version_of(image: bpy.types.Image, hurry: bool = False) -> tuple[object, ...] | None:
     """Changes whenever the image's pixels, or their meaning, do.
 
     Parameters
@@ -139,7 +141,8 @@ def version_of(image: bpy.types.Image, hurry: bool = False) -> tuple[object, ...
     image
         Any image.
     hurry
-        While a window is drawn: pixels that are in no file may be looked at only now and then.
+        While a window is drawn: pixels that are in no file may be looked at only now and then, and if they are many,
+        nothing may be known yet: then it is None, and the editors are drawn when it can be known.
     """
     if image.type == "RENDER_RESULT":
         return image.session_uid, image.render_slots.active_index, _renders
@@ -150,7 +153,8 @@ def version_of(image: bpy.types.Image, hurry: bool = False) -> tuple[object, ...
         return (*base, str(path), state.st_mtime_ns, state.st_size)
     if image.packed_file and not image.is_dirty:
         return (*base, "packed", image.packed_file.size)
-    return (*base, "pixels", _fingerprint(image, hurry))
+    found = _fingerprint(image, hurry)
+    return None if found is None else (*base, "pixels", found)
 
 
 # Renders of this session: of a render, Blender shows no pixels to compare.
@@ -167,20 +171,59 @@ def count_render() -> None:
 _fingerprints: dict[int, tuple[float, int]] = {}
 
 
-def _fingerprint(image: bpy.types.Image, hurry: bool) -> int:
+def _fingerprint(image: bpy.types.Image, hurry: bool) -> int | None:
     """A number that changes with the pixels: Blender does not tell when those of an image in memory change."""
-    import numpy as np
-
     begun = time.monotonic()
-    again, found = _fingerprints.get(image.session_uid, (0.0, 0))
+    again, found = _fingerprints.get(image.session_uid, (0.0, None))
     if hurry and begun < again:
         return found
-    pixels = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(pixels)
-    found = zlib.crc32(pixels)
+    room = _room(len(image.pixels), hurry)
+    if room is None:
+        return found
+    image.pixels.foreach_get(room)
+    found = zlib.crc32(room)
     ended = time.monotonic()
     _fingerprints[image.session_uid] = (ended + max(0.3, 20 * (ended - begun)), found)
     return found
+
+
+# Memory that Blender's pixels can be copied into. The system hands it out page by page as it is touched, which may take
+# ten times as long as the copy, so that is done in a thread.
+_rooms: "background.Worker[NDArray[np.float32]]" = background.Worker(kept=1)
+# Numbers that need no thread, and seconds for which memory is kept.
+_FEW, _KEPT = 16_000_000, 30.0
+_room_used = 0.0
+
+
+def _room(size: int, hurry: bool = False) -> "NDArray[np.float32] | None":
+    """Memory for so many numbers; None while it is being made ready, in a hurry."""
+    global _room_used
+    import numpy as np
+
+    if size <= _FEW:
+        return np.empty(size, np.float32)
+    room = _rooms.ask(size, lambda: partial(_touched, size)) if hurry else _rooms.found(size)
+    _room_used = time.monotonic()
+    if hurry and not bpy.app.timers.is_registered(_give_back):
+        bpy.app.timers.register(_give_back, first_interval=_KEPT)
+    return np.empty(size, np.float32) if room is None and not hurry else room
+
+
+def _touched(size: int) -> "NDArray[np.float32]":
+    import numpy as np
+
+    room = np.empty(size, np.float32)
+    room.fill(0)
+    return room
+
+
+def _give_back() -> float | None:
+    """Keep no memory that has not been used lately; a timer."""
+    rest = _room_used + _KEPT - time.monotonic()
+    if rest > 0:
+        return rest
+    _rooms.forget()
+    return None
 
 
 def loader(image: bpy.types.Image) -> "Callable[[], Photo]":
@@ -242,7 +285,9 @@ def pixels_of(image: bpy.types.Image) -> "NDArray[np.float32]":
     import numpy as np
 
     width, height = image.size
-    out = np.empty(width * height * image.channels, np.float32)
+    size = width * height * image.channels
+    taken = _rooms.take(size)
+    out = np.empty(size, np.float32) if taken is None else taken
     image.pixels.foreach_get(out)
     return out.reshape(height, width, image.channels)[::-1]
 
@@ -432,6 +477,16 @@ def new_image(name: str, pixels: "NDArray", space: "RGBSpace", premultiplied: bo
     premultiplied
         Whether RGB is multiplied by alpha.
     """
+    return image_maker(name, pixels, space, premultiplied, working_space())()
+
+
+def image_maker(
+    name: str, pixels: "NDArray", space: "RGBSpace", premultiplied: bool, working: "RGBSpace"
+) -> Callable[[], bpy.types.Image]:
+    """Return a function that makes an image as `new_image` does.
+
+    Only that function touches Blender, so another thread may make it; `working` is from `working_space`.
+    """
     import numpy as np
 
     from ..core import colorimetry, transfer
@@ -440,22 +495,25 @@ def new_image(name: str, pixels: "NDArray", space: "RGBSpace", premultiplied: bo
     height, width, channels = pixels.shape
     named = [blenders for blenders, ours in SPACE_NAMES.items() if SPACES[ours] is space]
     byte = pixels.dtype == np.uint8 and bool(named)
-    image = bpy.data.images.new(name, width, height, alpha=channels == 4, float_buffer=not byte)
-    rgba = np.ones((height, width, 4), np.float32)
+    rgba = np.ones((height, width, 4), np.float32)[::-1]  # in memory as Blender has it
     if byte:
-        image.colorspace_settings.name = named[0]
-        rgba[..., :channels] = pixels / np.float32(255)
+        np.divide(pixels, np.float32(255), out=rgba[..., :channels])
     else:
         linear = transfer.decode(pixels[..., :3], space.curve) if not space.curve.is_linear else pixels[..., :3]
-        working = working_space()
         if not np.allclose(space.to_xyz, working.to_xyz, atol=1e-6):
-            adapt = colorimetry.adaptation_matrix(space.white, working.white, "bradford")
-            linear = linear @ np.float32(working.from_xyz @ adapt @ space.to_xyz).T
+            linear = linear @ np.float32(colorimetry.conversion_matrix(space, working)).T
         rgba[..., :3] = linear
         if channels == 4:
             top = np.float32(np.iinfo(pixels.dtype).max if pixels.dtype.kind == "u" else 1)
             rgba[..., 3] = pixels[..., 3] / top
             if not premultiplied:
                 rgba[..., :3] *= rgba[..., 3:]
-    set_pixels(image, rgba)
-    return image
+
+    def make() -> bpy.types.Image:
+        image = bpy.data.images.new(name, width, height, alpha=channels == 4, float_buffer=not byte)
+        if byte:
+            image.colorspace_settings.name = named[0]
+        set_pixels(image, rgba)
+        return image
+
+    return make

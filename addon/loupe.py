@@ -86,10 +86,11 @@ class Loupe:
             reading = Reading(None, [str(error)])
         side, apart = drawing.scaled(_ACROSS * _ENLARGED), drawing.scaled(_APART)
         lines = _lines(photo, pixel, reading)
-        width = max(side, *(drawing.text_size(text)[0] for text in lines)) + drawing.scaled(14)
+        beside = drawing.scaled(4)
+        width = max(1.5 * side + beside, *(drawing.text_size(text)[0] for text in lines)) + drawing.scaled(14)
         height = side + drawing.scaled(16) * len(lines) + drawing.scaled(14)
         # To the right of the cursor and above, or where there is room.
-        left = x + apart if x + apart + width < region.width else max(0.0, x - apart - width)
+        left = x + apart if x + apart + width < _right_of(region) else max(0.0, x - apart - width)
         bottom = y + apart if y + apart + height < region.height else max(0.0, y - apart - height)
         height = drawing.note(left, bottom, lines)
         if photo is not None:
@@ -99,9 +100,14 @@ class Loupe:
             _frame(left, base, side)
             _frame(left + _ACROSS // 2 * cell, base + _ACROSS // 2 * cell, cell)
             if reading.color is not None:
-                beside = left + side + drawing.scaled(4)
-                _picture(reading.color.reshape(1, 1, 3), beside, base, side / 2, display)
-                _frame(beside, base, side / 2)
+                _picture(reading.color.reshape(1, 1, 3), left + side + beside, base, side / 2, display)
+                _frame(left + side + beside, base, side / 2)
+
+
+def _right_of(region: bpy.types.Region) -> float:
+    """Where the part of a region ends that the sidebar does not cover."""
+    sidebars = [part for part in bpy.context.area.regions if part.type == "UI" and part.width > 1 and part.x > region.x]
+    return min([part.x - region.x for part in sidebars], default=region.width)
 
 
 def _lines(photo: "Photo | None", pixel: tuple[int, int], reading: Reading) -> list[str]:
@@ -112,9 +118,8 @@ def _lines(photo: "Photo | None", pixel: tuple[int, int], reading: Reading) -> l
 
     lines = [f"{pixel[0]}, {pixel[1]}"]
     if photo is not None and reading.color is not None:
-        adapt = colorimetry.adaptation_matrix(photo.space.white, SRGB.white, "bradford")
-        linear = colorimetry.xyz_to_linear(adapt @ colorimetry.linear_to_xyz(reading.color, photo.space), SRGB)
-        codes = transfer.encode(np.asarray(linear), SRGB.curve, np.uint8)
+        linear = colorimetry.conversion_matrix(photo.space, SRGB) @ reading.color
+        codes = transfer.encode(linear, SRGB.curve, np.uint8)
         lab = colorimetry.linear_to_lab(reading.color, photo.space)
         lines[0] += "   #{:02X}{:02X}{:02X}".format(*codes)
         lines.append("Lab {:.1f}, {:.1f}, {:.1f}".format(*lab))

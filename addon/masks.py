@@ -1,7 +1,7 @@
 """What a region of the panel covers: its mask from whatever Blender has."""
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,7 @@ class Source:
     Attributes
     ----------
     version
-        Changes whenever the mask does.
+        Changes whenever the mask does; None if it is not known yet, see `images.version_of`.
     load
         Called with the photo's (height, width), gives a function that gives the coverage, as
         `batch.files.read_mask` has it. Only the first call touches Blender; it raises a DyehouseError if there is
@@ -39,7 +39,7 @@ class Source:
         Whether that file is for the upright photo, and not for one that lies as it is stored.
     """
 
-    version: tuple[object, ...]
+    version: tuple[object, ...] | None
     load: "Callable[[tuple[int, int]], Callable[[], NDArray]]"
     file: Path | None = None
     upright: bool = False
@@ -52,7 +52,7 @@ def asked(region: "DyehouseRegion", index: int) -> str | None:
     return f"blender:{index}"
 
 
-def sources(image: bpy.types.Image, hurry: bool = False) -> dict[str, Source]:
+def sources(image: bpy.types.Image, hurry: bool = False, indices: Sequence[int] | None = None) -> dict[str, Source]:
     """The masks of an image's regions that are not made from the photo, by the names that `asked` gives them.
 
     Parameters
@@ -61,39 +61,52 @@ def sources(image: bpy.types.Image, hurry: bool = False) -> dict[str, Source]:
         The photo.
     hurry
         As for `images.version_of`.
+    indices
+        Of the regions; None for all.
 
     Raises
     ------
     MaskError
         If a region has none.
     """
-    found = {}
-    for index, region in enumerate(image.dyehouse.regions):
-        if region.mask_source not in _OF_THE_PHOTO:
-            found[f"blender:{index}"] = _source(region, hurry)
-    return found
+    regions = image.dyehouse.regions
+    wanted = [(k, regions[k]) for k in (range(len(regions)) if indices is None else indices)]
+    return {f"blender:{k}": _source(region, hurry) for k, region in wanted if region.mask_source not in _OF_THE_PHOTO}
+
+
+def missing(region: "DyehouseRegion") -> str:
+    """What a region's mask still needs, in a sentence; empty if nothing."""
+    given = {
+        "IMAGE": {"mask image": region.mask_image},
+        "SPLINE": {"spline mask": region.mask_spline},
+        "FILE": {"mask file": region.mask_file},
+        "CRYPTOMATTE": {"cryptomatte file": _matte_file(region), "names of objects or materials": region.matte_names},
+    }
+    for what, value in given.get(region.mask_source, {}).items():
+        if not value:
+            return f"Region '{region.name}' has no {what}: choose one, or click the product instead."
+    return ""
 
 
 def _source(region: "DyehouseRegion", hurry: bool) -> Source:
-    kind, library = region.mask_source, region.id_data.library
-    if kind == "IMAGE":
-        return of_image(_given(region.mask_image, region, "mask image"), hurry)
-    if kind == "SPLINE":
-        return of_spline(_given(region.mask_spline, region, "spline mask"))
-    if kind == "FILE":
-        path = Path(bpy.path.abspath(_given(region.mask_file, region, "mask file"), library=library))
-        return of_file(path, images.orientation_of(region.id_data))
-    text = region.matte_file or getattr(region.id_data, "filepath", "")
-    path = Path(bpy.path.abspath(_given(text, region, "cryptomatte file"), library=library))
-    return of_matte(path, _given(region.matte_names, region, "names of objects or materials"), region.matte_layer)
-
-
-def _given(value: Any, region: "DyehouseRegion", what: str) -> Any:
     from ..core.errors import MaskError
 
-    if not value:
-        raise MaskError(f"Region '{region.name}' has no {what}: choose one, or click the product instead.")
-    return value
+    if problem := missing(region):
+        raise MaskError(problem)
+    kind, library = region.mask_source, region.id_data.library
+    if kind == "IMAGE":
+        return of_image(region.mask_image, hurry)
+    if kind == "SPLINE":
+        return of_spline(region.mask_spline)
+    if kind == "FILE":
+        path = Path(bpy.path.abspath(region.mask_file, library=library))
+        return of_file(path, images.orientation_of(region.id_data))
+    path = Path(bpy.path.abspath(_matte_file(region), library=library))
+    return of_matte(path, region.matte_names, region.matte_layer)
+
+
+def _matte_file(region: "DyehouseRegion") -> str:
+    return region.matte_file or getattr(region.id_data, "filepath", "")
 
 
 def of_image(image: bpy.types.Image, hurry: bool = False) -> Source:

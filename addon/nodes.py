@@ -533,9 +533,11 @@ def feed_matte(node: bpy.types.Node, kind: str, **settings: Any) -> bpy.types.No
 
 
 def _edge_group() -> bpy.types.NodeTree:
-    """The product's light in soft pixels beyond its share by coverage: `core.compositing.unmix_edge`, as nodes.
+    """The product's light in soft pixels of a matte, beyond their share of the light by coverage.
 
-    The background is the mean of the clear pixels in a window; where there are none, the edge is blended plainly.
+    The matte is believed, as `core.compositing.refine_outline` cannot be had in nodes: the background's part, by the
+    mean of the clear pixels in a window, is taken off. Where that mean is missing or brighter than the pixel allows,
+    the edge is blended by coverage.
     """
     for group in bpy.data.node_groups:
         if group.library is None and _EDGE_MARK in group:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ..core.colorspace import RGBSpace
     from ..core.layers import Layers
     from ..core.recolor import RegionMatrix
 
@@ -82,7 +83,7 @@ class Map:
     Attributes
     ----------
     colors
-        (height, width, 4) sRGB codes in 0..1, and coverage.
+        (height, width, 4) float32 linear RGB of the working space, and coverage.
     words
         What the legend says besides the scale.
     """
@@ -90,6 +91,9 @@ class Map:
     colors: "NDArray[np.float32]"
     words: str = ""
 
+
+# sRGB codes in 0..1 and coverage (height, width, 4), and what the legend says.
+type _Codes = tuple[NDArray[np.float32], str]
 
 _maps: "background.Worker[Map]" = background.Worker()
 # Of each image (session_uid), the map that was there last and its texture, and what they are of.
@@ -104,55 +108,73 @@ def map_of(kind: str, index: int, now: preview.Shown) -> Map | None:
     DyehouseError
         If a target cannot be used.
     """
-    key, make = _asked(kind, index, now)
-    return _maps.ask(key, lambda: make)
+    from . import images
+
+    (key, make), working = _asked(kind, index, now), images.working_space()
+    return _maps.ask((key, working.name), lambda: partial(_made, make, working))
 
 
-def _asked(kind: str, index: int, now: preview.Shown) -> tuple[tuple[object, ...], Callable[[], Map]]:
+def _asked(kind: str, index: int, now: preview.Shown) -> tuple[tuple[object, ...], Callable[[], _Codes]]:
     """What a map depends on, and the function that makes it."""
     prepared = now.look.prepared
     if kind == "GAMUT":
         regions = prepared.regions()
-        return (now.look.key, kind, *(r.matrix.tobytes() for r in regions)), partial(_gamut, now, regions)
+        space = now.look.photo.wanted or now.look.photo.space
+        key = now.look.key, kind, space.name, *(r.matrix.tobytes() for r in regions)
+        return key, partial(_gamut, now, regions, space)
     if kind == "ERROR":
         target, white = prepared.target(index), prepared.target_white
         return (now.look.key, kind, index, target.tobytes(), white.tobytes()), partial(_error, now, index, target)
     return (now.look.key, kind, index), partial(_found, kind, now, index)
 
 
-def _found(kind: str, now: preview.Shown, index: int) -> Map:
+def _made(make: Callable[[], _Codes], working: "RGBSpace") -> Map:
+    import numpy as np
+
+    from ..core import colorimetry, colorspace, transfer
+
+    codes, words = make()
+    matrix = colorimetry.conversion_matrix(colorspace.SRGB, working).astype(np.float32)
+    return Map(np.dstack([transfer.SRGB.decode(codes[..., :3]) @ matrix.T, codes[..., 3]]), words)
+
+
+def _found(kind: str, now: preview.Shown, index: int) -> _Codes:
     analysis = now.look.prepared.analyses[index].thinned(now.whole.step)
     values = {"A": analysis.A, "B": analysis.B}[kind] if kind in "AB" else analysis.residual
     return _colored(kind, values, now, index)
 
 
-def _error(now: preview.Shown, index: int, target: "NDArray[np.float64]") -> Map:
+def _error(now: preview.Shown, index: int, target: "NDArray[np.float64]") -> _Codes:
     prepared, step = now.look.prepared, now.whole.step
     values = prepared.analyses[index].predicted_error(target, prepared.target_white)
     return _colored("ERROR", values[::step, ::step], now, index)
 
 
-def _colored(kind: str, values: "NDArray", now: preview.Shown, index: int) -> Map:
+def _colored(kind: str, values: "NDArray", now: preview.Shown, index: int) -> _Codes:
     import numpy as np
 
     share = now.whole.data[now.whole.firsts[index], ..., 3]
     inside = values[share > 0.5]
     scale = SCALES[kind]
     words = f"Mean {inside.mean() * scale.factor:.3g}, {scale.unit}" if inside.size else ""
-    return Map(np.dstack([viridis(values / scale.top), share]), words)
+    return np.dstack([viridis(values / scale.top), share]), words
 
 
-def _gamut(now: preview.Shown, regions: "list[RegionMatrix]") -> Map:
+def _gamut(now: preview.Shown, regions: "list[RegionMatrix]", space: "RGBSpace") -> _Codes:
     import numpy as np
 
+    from ..core.colorimetry import conversion_matrix
     from ..core.gamut import out_of_gamut
 
     product = (now.whole.data[list(now.whole.firsts), ..., 3] > 0).any(axis=0)
-    outside = out_of_gamut(now.whole.recolored(regions)) & product
+    recolored = now.whole.recolored(regions)
+    if space is not now.look.photo.space:
+        recolored = recolored @ np.float32(conversion_matrix(now.look.photo.space, space)).T
+    outside = out_of_gamut(recolored) & product
     colors = np.zeros((*outside.shape, 4), np.float32)
     colors[outside] = (*_OUT_OF_GAMUT, 1)
     part = outside[product].mean() if product.any() else 0.0
-    return Map(colors, f"{part:.1%} of the product outside {now.look.photo.space.name}")
+    return colors, f"{part:.1%} of the product outside {space.name}"
 
 
 def _region_words(now: preview.Shown, index: int) -> str:
@@ -164,15 +186,13 @@ def _region_words(now: preview.Shown, index: int) -> str:
 
 
 def _shown(space: bpy.types.SpaceImageEditor) -> tuple[bpy.types.Image, str, int, preview.Shown] | None:
-    """Image, overlay, active region and what is shown of the image, where there is an overlay to draw."""
+    """Image, overlay, place of the active region in the look, and what is shown, where there is one to draw."""
     image = preview.wanted(space)
     if image is None or (kind := preview.overlay_of(image)) == "NONE":
         return None
     now, _ = preview.shown(image)
-    index = image.dyehouse.active_region
-    if now is None or not 0 <= index < len(now.whole.firsts):
-        return None
-    return image, kind, index, now
+    index = now.look.place(image.dyehouse.active_region) if now else None
+    return None if now is None or index is None else (image, kind, index, now)
 
 
 def _draw() -> None:
@@ -190,7 +210,7 @@ def _draw() -> None:
         return  # said in words by the preview
     last = _last.get(image.session_uid)
     if made is not None and (last is None or last[1] is not made):
-        last = _last[image.session_uid] = key, made, drawing.texture(_in_working_space(made.colors))
+        last = _last[image.session_uid] = key, made, drawing.texture(made.colors)
     if last is None or last[0] != key:
         return  # better no map than another one
     with preview.canvas().bind():
@@ -203,17 +223,6 @@ def _free() -> None:
     drawn = {image.session_uid for image in images if image and preview.overlay_of(image) not in {"NONE", "REGION"}}
     for uid in set(_last) - drawn:
         del _last[uid]
-
-
-def _in_working_space(colors: "NDArray[np.float32]") -> "NDArray[np.float32]":
-    import numpy as np
-
-    from ..core import colorspace, transfer
-    from . import images
-
-    working = images.working_space()
-    linear = transfer.SRGB.decode(colors[..., :3]) @ (working.from_xyz @ colorspace.SRGB.to_xyz).T
-    return np.dstack([linear, colors[..., 3]]).astype(np.float32)
 
 
 def _draw_map(texture: gpu.types.GPUTexture, layers: "Layers", opacity: float) -> None:

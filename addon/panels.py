@@ -2,15 +2,20 @@
 
 import textwrap
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import bpy
 
 from . import recipes, session, swatches, thumbnails
-from .operators import write
+from .operators import catalog, write
 from .properties import NOWHERE
 
 if TYPE_CHECKING:
+    from ..core.colorspace import RGBSpace
+    from ..core.gamut import Compromise
+    from ..core.metamerism import Look as Appearance
+    from ..core.metamerism import MetamerismIndex
     from ..core.swatches import Swatch
     from .properties import DyehousePhoto, DyehouseRegion
 
@@ -40,14 +45,50 @@ def sentences(layout: bpy.types.UILayout, context: bpy.types.Context, text: str,
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE", translate=False)
 
 
+# What `found` found since the window was drawn before, by the image's session_uid: every part of the panel asks.
+_found: "dict[int, tuple[session.Look | None, str]]" = {}
+
+
 def found(image: bpy.types.Image) -> "tuple[session.Look | None, str]":
-    """What is known of the photo by now, and what stands in the way of knowing more."""
+    """What is known of the photo by now, and what stands in the way of knowing more; for drawing only."""
     from ..core.errors import DyehouseError
 
-    try:
-        return session.ready(image), ""
-    except DyehouseError as error:
-        return None, str(error)
+    if image.session_uid not in _found:
+        try:
+            _found[image.session_uid] = session.ready(image), ""
+        except DyehouseError as error:
+            _found[image.session_uid] = None, str(error)
+        bpy.app.timers.register(_found.clear)  # which is after the drawing
+    return _found[image.session_uid]
+
+
+@lru_cache(maxsize=32)
+def compromise(linear: tuple[float, ...], space: "RGBSpace") -> "Compromise":
+    """The nearest color to linear RGB that a space can hold."""
+    from ..core import gamut
+
+    return gamut.nearest(linear, space)
+
+
+@lru_cache(maxsize=32)
+def under_lights(target: "Swatch", observer: str) -> "list[Appearance]":
+    """The look of a spectral target under each light; raises a DyehouseError for others."""
+    from ..core import metamerism
+
+    return metamerism.under_lights(target, observer=observer)
+
+
+@lru_cache(maxsize=32)
+def metamerism_of(source: "Swatch | None", target: "Swatch", observer: str) -> "list[MetamerismIndex]":
+    """The indices of a spectral target against the product's present color under the other lights.
+
+    There are none where that is no spectrum.
+    """
+    from ..core import metamerism
+
+    if source is None or metamerism.cannot_be_known(source):
+        return []
+    return metamerism.special_indices(source, target, observer=observer)
 
 
 class DYEHOUSE_UL_regions(bpy.types.UIList):
@@ -118,6 +159,9 @@ class DYEHOUSE_PT_photo(_Tab, bpy.types.Panel):
             sentences(layout, context, problem, "ERROR")
         elif look is None:
             layout.label(text="Analyzing...", icon="TIME")
+        for region in asked.regions if look else ():
+            if waiting := recipes.unpicked(region):
+                sentences(layout, context, waiting, "INFO")
 
 
 class _Part(_Tab):
@@ -189,6 +233,12 @@ class DYEHOUSE_PT_region(_Part, bpy.types.Panel):
         row.prop(region, "found_color")
 
 
+def _light(layout: bpy.types.UILayout, asked: "DyehousePhoto", kind: str, name: str) -> None:
+    """Draw the setting that says what a light is, the white of the photo's or the new one."""
+    if kind in {"ILLUMINANT", "TEMPERATURE", "COLOR"}:
+        layout.prop(asked, f"{name}_{kind.lower()}")
+
+
 class DYEHOUSE_PT_white(_Part, bpy.types.Panel):
     """The light of the photo."""
 
@@ -202,13 +252,8 @@ class DYEHOUSE_PT_white(_Part, bpy.types.Panel):
         if kind == "PIXEL":
             if tuple(asked.white_pixel) != NOWHERE:
                 layout.prop(asked, "white_pixel")
-            layout.prop(asked, "gray")
-        elif kind == "ILLUMINANT":
-            layout.prop(asked, "white_illuminant")
-        elif kind == "TEMPERATURE":
-            layout.prop(asked, "white_temperature")
-        elif kind == "COLOR":
-            layout.prop(asked, "white_color")
+            layout.prop(asked, "gray", text="Reflectance")
+        _light(layout, asked, kind, "white")
         layout.operator("dyehouse.pick_white", icon="EYEDROPPER")
         row = layout.row()
         row.enabled = False
@@ -242,22 +287,15 @@ class DYEHOUSE_PT_target(_Part, bpy.types.Panel):
         if region.meaning == "product":
             layout.prop(region, "source")
         layout.prop(asked, "light_source")
-        kind = asked.light_source
-        if kind == "ILLUMINANT":
-            layout.prop(asked, "light_illuminant")
-        elif kind == "TEMPERATURE":
-            layout.prop(asked, "light_temperature")
-        elif kind == "COLOR":
-            layout.prop(asked, "light_color")
+        _light(layout, asked, asked.light_source, "light")
 
     def _gamut(self, context, layout, image):
-        from ..core import gamut
-
-        look, index = session.last(image), image.dyehouse.active_region
-        if look is None or index >= len(look.prepared.analyses):
+        look, _ = found(image)
+        place = look.place(image.dyehouse.active_region) if look else None
+        if look is None or place is None:
             return
-        space = look.photo.space
-        nearest = gamut.nearest(look.prepared.target(index), space)
+        space = look.photo.wanted or look.photo.space
+        nearest = compromise(tuple(recipes.between(look.photo.space, space, look.prepared.target(place))), space)
         if nearest.difference > _SEEN:
             row = layout.row()
             row.label(icon_value=swatches.icon_of_color(recipes.codes(nearest.linear, space)))
@@ -300,6 +338,14 @@ class DYEHOUSE_PT_swatches(_Part, bpy.types.Panel):
         )
         if state.library != "ALL" and swatches.book().is_own(state.library):
             row.operator("dyehouse.remove_library", text="", icon="TRASH").library = state.library
+        row = layout.row(align=True)
+        row.prop_search(state, "palette", bpy.data, "palettes", text="", icon="COLOR")
+        button = row.row(align=True)
+        button.enabled = bool(state.palette)
+        button.operator("dyehouse.swatches_from_palette", text="", icon="IMPORT").palette = state.palette
+        button = row.row(align=True)
+        button.enabled = state.library != "ALL"
+        button.operator("dyehouse.swatches_to_palette", text="", icon="EXPORT").library = state.library
         for problem in swatches.book().problems:
             sentences(layout, context, problem, "ERROR")
 
@@ -333,7 +379,6 @@ class DYEHOUSE_PT_lights(_Part, bpy.types.Panel):
 
     def of_photo(self, context, layout, image):
         """Draw the look of the target under each light, or why it cannot be known."""
-        from ..core import metamerism
         from ..core.errors import DyehouseError
 
         region = active_region(image.dyehouse)
@@ -341,14 +386,38 @@ class DYEHOUSE_PT_lights(_Part, bpy.types.Panel):
         if target is None:
             return
         try:
-            looks = metamerism.under_lights(target, observer=image.dyehouse.observer)
+            looks = under_lights(target, image.dyehouse.observer)
         except DyehouseError as error:
             sentences(layout, context, str(error), "INFO")
             return
+        layout.prop(region, "source")
+        indices = {index.test: index for index in self._metamerism(context, layout, image, region, target)}
+        row = layout.row()
+        for title in ("Light", "Shift", *(["Metamerism"] if indices else [])):
+            row.label(text=title)
         for look in looks:
             row = layout.row()
             row.label(text=look.light, icon_value=swatches.icon_of_color(tuple(look.display)), translate=False)
             row.label(text=f"{look.shift:.1f}", translate=False)
+            if indices:
+                index = indices.get(look.light)
+                row.label(text=f"{index.value:.1f}" if index else "", translate=False)
+        for index in list(indices.values())[:1]:
+            sentences(layout, context, f"Metamerism against the present color; {index.match}", "INFO")
+
+    def _metamerism(self, context, layout, image, region, target):
+        from ..core.errors import DyehouseError
+        from ..core.swatches import parse_target
+
+        try:
+            source = parse_target(region.source, recipes.folder_of(image)) if region.source else None
+            found = metamerism_of(source, target, image.dyehouse.observer)
+        except DyehouseError as error:
+            sentences(layout, context, str(error), "ERROR")
+            return []
+        if not found:
+            sentences(layout, context, "For the metamerism index, give the present color as a spectrum", "INFO")
+        return found
 
 
 def _target(region: "DyehouseRegion", image: bpy.types.Image) -> "Swatch | None":
@@ -395,6 +464,7 @@ class DYEHOUSE_PT_write(_Part, bpy.types.Panel):
         column = layout.column()
         column.prop(asked, "output_pattern")
         column.prop(asked, "quality")
+        column.prop(asked, "output_space")
         column.prop(asked, "overwrite")
         column.operator("dyehouse.write_colorways", icon="RENDERLAYERS")
         progress = write.progress()
@@ -422,9 +492,10 @@ class DYEHOUSE_PT_diagnostics(_Part, bpy.types.Panel):
         row.active = asked.overlay != "NONE"
         row.prop(asked, "overlay_opacity")
         look, _ = found(image)
-        if look is None or not 0 <= asked.active_region < len(look.prepared.analyses):
+        analysis = look.analysis(asked.active_region) if look else None
+        if analysis is None:
             return
-        report = look.prepared.analyses[asked.active_region].report
+        report: dict[str, Any] = analysis.report
         column = layout.column(align=True)
         for label, value in (
             ("Model", str(report["model"]).replace("_", " ").title()),
@@ -456,6 +527,43 @@ class DYEHOUSE_PT_advanced(_Part, bpy.types.Panel):
         layout.prop(asked, "camera")
         layout.prop(asked, "observer")
         layout.prop(asked, "adaptation")
+        look, _ = found(image)
+        place = look.place(asked.active_region) if look else None
+        if look is None or place is None:
+            return
+        recipe = look.prepared.recipe
+        swatch, light = recipe.regions[place].target, recipe.illuminant if isinstance(recipe.illuminant, str) else None
+        if swatch is not None:
+            fate = swatch.fate(look.photo.space, light, recipe.observer, recipe.camera, recipe.adaptation)
+            sentences(layout, context, fate, "INFO")
+
+
+class DYEHOUSE_PT_catalog(_Tab, bpy.types.Panel):
+    """Many photos, by a recipe or a table."""
+
+    bl_label = "Catalog"
+    bl_parent_id = "DYEHOUSE_PT_photo"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """Draw what is asked for, how far it is, and what came of it."""
+        layout, asked = self.layout, context.scene.dyehouse_catalog
+        layout.use_property_split, layout.use_property_decorate = True, False
+        for name in ("jobs", "output", "existing", "max_error"):
+            layout.prop(asked, name)
+        row = layout.row(align=True)
+        row.operator("dyehouse.check_batch", icon="CHECKMARK")
+        row.operator("dyehouse.run_batch", icon="PLAY")
+        progress, outcome = catalog.progress(), catalog.outcome()
+        if progress:
+            done, total, text = progress
+            layout.progress(factor=done / total, type="BAR", text=text, translate=False)
+        if outcome:
+            sentences(layout, context, outcome.sentence, "INFO")
+            for problem in outcome.named:
+                sentences(layout, context, problem, "ERROR")
+            if outcome.page:
+                layout.operator("wm.url_open", text="Open Page of the Run", icon="URL").url = outcome.page.as_uri()
 
 
 class DYEHOUSE_PT_warnings(_Part, bpy.types.Panel):
@@ -469,13 +577,11 @@ class DYEHOUSE_PT_warnings(_Part, bpy.types.Panel):
         image = photo_shown(context)
         if image is None or not image.dyehouse.regions:
             return False
-        look, _ = found(image)
-        return look is not None and bool(look.prepared.warnings)
+        return bool(session.warnings(image, found(image)[0]))
 
     def of_photo(self, context, layout, image):
         """Draw the warnings of the photo's look."""
-        look, _ = found(image)
-        for warning in look.prepared.warnings if look else ():
+        for warning in session.warnings(image, found(image)[0]):
             sentences(layout, context, warning, "ERROR")
 
 
@@ -493,16 +599,6 @@ CLASSES = (
     DYEHOUSE_PT_write,
     DYEHOUSE_PT_diagnostics,
     DYEHOUSE_PT_advanced,
+    DYEHOUSE_PT_catalog,
 )
-
-
-def register() -> None:
-    """Add the tab."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Remove it."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -41,13 +41,13 @@ class _OfTexture(_Split):
                 button.image_settings = True
             return
         _settings(layout, node)
-        share = texture_operators.progress()
-        if share is None:
+        progress = texture_operators.progress()
+        if progress is None:
             row = layout.row(align=True)
             _texture_operator(row, "dyehouse.bake_texture", texture, "Bake")
             _texture_operator(row, "dyehouse.bake_texture", texture, "Bake and Use").use = True
         else:
-            layout.progress(factor=share, text="Baking; Esc: Stop")
+            layout.progress(factor=progress[0], text="Baking; Esc: Stop")
         layout.operator("dyehouse.remove_recolor").node = node.name
 
 
@@ -149,15 +149,4 @@ def _input(layout: bpy.types.UILayout, node: bpy.types.Node, name: str) -> None:
 
 
 CLASSES = (DYEHOUSE_PT_shader, DYEHOUSE_PT_material, DYEHOUSE_PT_compositor)
-
-
-def register() -> None:
-    """Add the panels."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Remove them."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -8,14 +8,14 @@ import textwrap
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import bpy
 import gpu
 from bpy.app.handlers import persistent
 
-from . import background, drawing, images, session
+from . import background, drawing, images, recipes, session
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,18 +23,19 @@ if TYPE_CHECKING:
 
     from ..batch.files import Photo
     from ..core.layers import Box, Layers
+    from ..core.transfer import Curve
     from .session import Look
 
 # Pixels of a texture at most: more than an editor on a usual screen has.
 _MOST_PIXELS = 2_400_000
 # Of all layers together: 16 bytes each.
-_MOST_TEXELS = 16_000_000
+_MOST_TEXELS = 10_000_000
 # Seconds that the view must rest before its part of the photo is fetched in full resolution.
 _REST = 0.2
 # Gap between the pictures side by side, as a share of the width.
 GAP = 0.02
-# Entries of the table that takes light to the light that Blender shows for the same code.
-_TABLE = 4096
+# Entries of a table of light that is interpolated, and columns of one of steps.
+_TABLE, _COLUMNS = 4096, 256
 _LETTERS = 90
 
 _VERTEX = """
@@ -77,15 +78,21 @@ vec3 fit(vec3 rgb) {
 }
 
 vec3 as_blender_reads(vec3 rgb) {
-    int last = textureSize(curve, 0).x - 1;
+    int columns = textureSize(curve, 0).x, last = columns * textureSize(curve, 0).y - 1;
     if (last == 0) {
         return rgb;
     }
-    vec3 x = sqrt(clamp(rgb, 0.0, 1.0)) * float(last);
+    vec3 x = clamp(rgb, 0.0, 1.0);
+    x = rooted ? sqrt(x) : x;
     for (int k = 0; k < 3; k++) {
-        int low = min(int(x[k]), last - 1);
-        rgb[k] = mix(texelFetch(curve, ivec2(low, 0), 0).x, texelFetch(curve, ivec2(low + 1, 0), 0).x,
-                     x[k] - float(low));
+        if (stepped) {
+            int entry = min(int(x[k] * float(last + 1)), last);
+            rgb[k] = texelFetch(curve, ivec2(entry % columns, entry / columns), 0).x;
+        } else {
+            int low = min(int(x[k] * float(last)), last - 1);
+            rgb[k] = mix(texelFetch(curve, ivec2(low, 0), 0).x, texelFetch(curve, ivec2(low + 1, 0), 0).x,
+                         x[k] * float(last) - float(low));
+        }
     }
     return rgb;
 }
@@ -119,6 +126,25 @@ void main() {
 
 
 @dataclass(frozen=True, eq=False)
+class Table:
+    """A function of light.
+
+    Attributes
+    ----------
+    light
+        (rows, columns) float32 values, row by row, for equal steps of light from 0 to 1.
+    rooted
+        Whether the steps are of the square root of light.
+    stepped
+        Whether a value holds for the whole step after it, as in a file of bytes; else it is between its neighbors.
+    """
+
+    light: "NDArray[np.floating]"
+    rooted: bool
+    stepped: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Display:
     """What becomes of the photo's linear light on its way through a file into Blender's editor.
 
@@ -127,8 +153,7 @@ class Display:
     matrix
         (3, 3) linear RGB as Blender reads it to the working space.
     table
-        (n,) light as Blender reads it, for equal steps of the root of light as the photo means it; None where both
-        are the same.
+        Light as Blender reads it by light as the photo means it; None where both are the same.
     fitted
         Whether recolored pixels are brought into gamut first, as they are for files of integers.
     straight
@@ -136,7 +161,7 @@ class Display:
     """
 
     matrix: "NDArray[np.floating]"
-    table: "NDArray[np.floating] | None" = None
+    table: "Table | None" = None
     fitted: bool = False
     straight: bool = False
 
@@ -145,15 +170,28 @@ def display_of(image: bpy.types.Image, photo: "Photo") -> Display:
     """How Blender shows files like this one, given its color space settings."""
     import numpy as np
 
-    from ..core.colorimetry import adaptation_matrix
+    from ..core.colorimetry import conversion_matrix
 
     read, working = images.space_in_blender(image), images.working_space()
-    matrix = working.from_xyz @ adaptation_matrix(read.white, working.white, "bradford") @ read.to_xyz
-    table = None
-    if photo.space.curve != read.curve:
-        light = np.linspace(0, 1, _TABLE) ** 2
-        table = read.curve.decode(np.clip(photo.space.curve.encode(light), 0, 1))
+    matrix = conversion_matrix(read, working)
+    table = _table(photo.space.curve, read.curve, photo.pixels.dtype == np.uint8)
     return Display(matrix, table, photo.pixels.dtype.kind == "u", not photo.premultiplied)
+
+
+@lru_cache(8)
+def _table(meant: "Curve", read: "Curve", byte: bool) -> Table | None:
+    """What Blender makes of a photo's light by way of a file."""
+    import numpy as np
+
+    from ..core.transfer import byte_codes, decode_table
+
+    if byte:
+        codes, rooted = byte_codes(meant)
+        return Table(decode_table(read, np.uint8)[codes].reshape(-1, _COLUMNS), rooted, True)
+    if meant == read:
+        return None
+    light = np.linspace(0, 1, _TABLE) ** 2
+    return Table(read.decode(np.clip(meant.encode(light), 0, 1))[None], True, False)
 
 
 _shader: gpu.types.GPUShader | None = None
@@ -181,6 +219,8 @@ def _compiled() -> gpu.types.GPUShader:
         info.push_constant("INT", "count")
         info.push_constant("INT", "marked")
         info.push_constant("BOOL", "nearest")
+        info.push_constant("BOOL", "rooted")
+        info.push_constant("BOOL", "stepped")
         info.push_constant("BOOL", "fitted")
         info.push_constant("BOOL", "straight")
         info.push_constant("BOOL", "opaque")
@@ -260,10 +300,11 @@ def paint(
     )
     to_working = np.zeros((1, 3, 4), np.float32)
     to_working[0, :, :3] = display.matrix
-    table = np.zeros((1, 1 if display.table is None else len(display.table), 4), np.float32)
-    table[0, :, 0] = 0 if display.table is None else display.table
+    table = display.table or Table(np.zeros((1, 1)), False, False)
+    light = np.zeros((*table.light.shape, 4), np.float32)
+    light[..., 0] = table.light
     # Named: a texture that nobody holds is gone before the drawing.
-    matrices, curve = drawing.texture(np.concatenate([weights, to_working])), drawing.texture(table)
+    matrices, curve = drawing.texture(np.concatenate([weights, to_working])), drawing.texture(light)
     gpu.state.blend_set("NONE")
     gpu.state.depth_test_set("NONE")
     shader.bind()
@@ -277,6 +318,8 @@ def paint(
     shader.uniform_int("marked", painting.marked)
     shader.uniform_bool("nearest", painting.nearest)
     shader.uniform_bool("opaque", painting.opaque)
+    shader.uniform_bool("rooted", table.rooted)
+    shader.uniform_bool("stepped", table.stepped)
     shader.uniform_bool("fitted", display.fitted)
     shader.uniform_bool("straight", display.straight)
     batch.draw(shader)
@@ -442,14 +485,14 @@ def _draw_photo(context: bpy.types.Context, image: bpy.types.Image, now: Shown, 
         boxes = [_visible(place, shift, width, height) for shift, _ in pictures]
         drawn = _detail(context.area, now, boxes, scale) or drawn
     display = display_of(image, photo)
-    marked = overlay_of(image) == "REGION" and 0 <= asked.active_region < len(now.whole.firsts)
+    selected = now.look.place(asked.active_region) if overlay_of(image) == "REGION" else None
     key, layers = drawn
     texture, weights = _texture(key, layers, used), layers.weights(regions)
     for shift, split in pictures:
         painting = Painting(
             (place[0], place[1], place[2] + shift * place[0], place[3]),
             split,
-            layers.firsts[asked.active_region] if marked else 0,
+            0 if selected is None else layers.firsts[selected],
             asked.overlay_opacity,
             nearest=scale * layers.step >= 1,
             opaque=context.space_data.display_channels == "COLOR" or shift > 0,
@@ -513,6 +556,7 @@ def _draw_notes() -> None:
             now.look.prepared.regions()
         except DyehouseError as error:
             note = str(error)
+        note = note or "     ".join(filter(None, map(recipes.unpicked, image.dyehouse.regions)))
     if now is not None and image.dyehouse.preview and image.dyehouse.view == "SPLIT":
         _draw_line(bpy.context.region, image.dyehouse.split)
     if note:

@@ -55,7 +55,7 @@ MASKS = (
 )
 
 MEANINGS = (
-    ("reference", "Color at the Reference", "A matte reference pixel shall have exactly the target color"),
+    ("reference", "Color at Reference", "A matte reference pixel shall have exactly the target color"),
     ("product", "Product Reflectance", "The product shall have the target's reflectance, in the light of the photo"),
 )
 
@@ -79,6 +79,12 @@ OVERLAYS = (
     ("RESIDUAL", "Residual", "What the model does not explain"),
     ("ERROR", "Predicted Error", "Color difference to expect, CIEDE2000"),
     ("GAMUT", "Out of Gamut", "Pixels that the output cannot hold"),
+)
+
+EXISTING = (
+    ("KEEP", "Leave Alone", "Do nothing where there are results already"),
+    ("RESUME", "Resume", "Make only what is missing, or has changed since"),
+    ("FORCE", "Make Anew", "Replace them all"),
 )
 
 OBSERVERS = (
@@ -121,6 +127,15 @@ def _spaces(_self: object, _context: object) -> list[tuple[str, str, str]]:
         )
         _lists["spaces"] = [as_told, *((name, space.name, "") for name, space in SPACES.items())]
     return _lists["spaces"]
+
+
+def _output_spaces(_self: object, _context: object) -> list[tuple[str, str, str]]:
+    if "output spaces" not in _lists:
+        from ..core.colorspace import SPACES
+
+        own = ("PHOTO", "As the Photo", "The color space of the photo")
+        _lists["output spaces"] = [own, *((name, space.name, "") for name, space in SPACES.items())]
+    return _lists["output spaces"]
 
 
 def _illuminants(_self: object, _context: object, typed: str) -> list[str]:
@@ -337,7 +352,7 @@ class DyehousePhoto(bpy.types.PropertyGroup):
     white_color: FloatVectorProperty(name="White", subtype="COLOR", size=3, min=0, default=(1, 1, 1), update=_color_set)
     white_illuminant: StringProperty(
         name="Illuminant",
-        description="A standard light, a temperature or a mixture",
+        description="A standard light, a temperature, a mixture, or a CSV file of wavelength and power",
         default="D65",
         search=_illuminants,
         search_options={"SUGGESTION"},
@@ -365,7 +380,7 @@ class DyehousePhoto(bpy.types.PropertyGroup):
     )
     light_illuminant: StringProperty(
         name="Illuminant",
-        description="A standard light, a temperature or a mixture",
+        description="A standard light, a temperature, a mixture, or a CSV file of wavelength and power",
         default="A",
         search=_illuminants,
         search_options={"SUGGESTION"},
@@ -414,23 +429,51 @@ class DyehousePhoto(bpy.types.PropertyGroup):
         options=RELATIVE,
         default="//{photo}-{colorway}.png",
     )
+    output_space: EnumProperty(
+        name="Color Space",
+        description="Of the files; a wide one holds colors that the photo's own cannot",
+        items=_output_spaces,
+        update=_redraw,
+    )
     overwrite: BoolProperty(name="Overwrite", description="Replace files that are there")
     quality: IntProperty(name="Quality", description="Of JPEG and WebP files", default=95, min=1, max=100)
 
 
-CLASSES = (DyehouseTarget, DyehouseClick, DyehouseRegion, DyehouseColorway, DyehousePhoto)
+class DyehouseCatalog(bpy.types.PropertyGroup):
+    """A catalog: many photos, by a recipe or a table."""
+
+    jobs: StringProperty(
+        name="Recipe or Table",
+        description="Recipe (.toml), or table (.csv, .tsv, .jsonl) with a row for each photo",
+        subtype="FILE_PATH",
+        options=RELATIVE,
+    )
+    output: StringProperty(name="Output", description="Folder of the results", subtype="DIR_PATH", options=RELATIVE)
+    existing: EnumProperty(
+        name="Earlier Results", description="What is done about results that are there", items=EXISTING
+    )
+    max_error: FloatProperty(
+        name="Largest Error",
+        description="Predicted CIEDE2000 above which a result is set aside for a person; 0 to set none aside",
+        min=0,
+        soft_max=10,
+        precision=1,
+    )
+
+
+CLASSES = (DyehouseTarget, DyehouseClick, DyehouseRegion, DyehouseColorway, DyehousePhoto, DyehouseCatalog)
+_register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 
 def register() -> None:
-    """Put the settings on images."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    """Put the settings on images, and those of catalogs on scenes."""
+    _register()
     bpy.types.Image.dyehouse = PointerProperty(type=DyehousePhoto)
+    bpy.types.Scene.dyehouse_catalog = PointerProperty(type=DyehouseCatalog)
 
 
 def unregister() -> None:
     """Take them away again."""
-    del bpy.types.Image.dyehouse
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    del bpy.types.Scene.dyehouse_catalog, bpy.types.Image.dyehouse
+    _unregister()
     _lists.clear()

@@ -1,6 +1,7 @@
 """The panel's settings as a recipe of the core, and a recipe as the panel's settings."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
@@ -84,11 +85,33 @@ def recipe_of(image: bpy.types.Image) -> "Recipe":
     DyehouseError
         If a setting cannot be understood; the sentence says which and why.
     """
+    return _with_regions(image, range(len(image.dyehouse.regions)))
+
+
+def recipe_so_far(image: bpy.types.Image) -> "tuple[Recipe, tuple[int, ...]]":
+    """The recipe without the regions that are not picked yet, if others are, and which of the panel's regions it has.
+
+    Errors as of `recipe_of`.
+    """
+    regions = image.dyehouse.regions
+    picked = tuple(k for k, region in enumerate(regions) if not unpicked(region)) or tuple(range(len(regions)))
+    return _with_regions(image, picked), picked
+
+
+def unpicked(region: "DyehouseRegion") -> str:
+    """Why a region does not say yet what belongs to it, in a sentence; empty if it does."""
+    reference = region.reference_source == "PIXEL" and tuple(region.reference) != NOWHERE
+    if region.mask_source == "CLICK" and tuple(region.click) == NOWHERE and not reference:
+        return f"Region '{region.name}' is not picked yet: press Pick Product and click it in the photo."
+    return masks.missing(region)
+
+
+def _with_regions(image: bpy.types.Image, indices: Sequence[int]) -> "Recipe":
     asked: DyehousePhoto = image.dyehouse
     return replace(
         without_regions(image),
-        regions=tuple(_region(region, index) for index, region in enumerate(asked.regions)),
-        colorways=tuple(colorway_of(colorway, image) for colorway in asked.colorways),
+        regions=tuple(_region(asked.regions[index], index) for index in indices),
+        colorways=tuple(_colorway(colorway, image, indices) for colorway in asked.colorways),
     )
 
 
@@ -125,11 +148,15 @@ def shown(image: bpy.types.Image) -> "Recipe":
 
 def colorway_of(colorway: "DyehouseColorway", image: bpy.types.Image) -> "Colorway":
     """A colorway of the panel as the core's; regions that it has no target for keep their color."""
+    return _colorway(colorway, image, range(len(image.dyehouse.regions)))
+
+
+def _colorway(colorway: "DyehouseColorway", image: bpy.types.Image, indices: Sequence[int]) -> "Colorway":
     from ..core.recipe import Colorway
 
-    count = len(image.dyehouse.regions)
-    targets = [swatch_of(target, image) for target in colorway.targets][:count]
-    return Colorway(colorway.name, tuple(targets + [None] * (count - len(targets))))
+    targets = colorway.targets
+    swatches = [swatch_of(targets[index], image) if index < len(targets) else None for index in indices]
+    return Colorway(colorway.name, tuple(swatches))
 
 
 def _region(region: "DyehouseRegion", index: int) -> "Region":
@@ -137,16 +164,15 @@ def _region(region: "DyehouseRegion", index: int) -> "Region":
     from ..core.recipe import Region
     from ..core.swatches import parse_target
 
+    if problem := unpicked(region):
+        raise MaskError(problem)
     clicked = region.mask_source == "CLICK"
-    reference, click = _reference(region), _pixel(region.click) if clicked else None
-    if clicked and click is None and (reference is None or len(reference) != 2):
-        raise MaskError(f"Region '{region.name}' is not picked yet: press Pick Product and click it in the photo.")
     clicks = region.more_clicks if clicked else ()
     return Region(
         target=swatch_of(region.target, region.id_data),
-        reference=reference,
+        reference=_reference(region),
         mask=masks.asked(region, index),
-        click=click,
+        click=_pixel(region.click) if clicked else None,
         tolerance=decimal(region.tolerance),
         meaning=region.meaning,
         source=parse_target(region.source, folder_of(region.id_data)) if region.source else None,
@@ -157,6 +183,12 @@ def _region(region: "DyehouseRegion", index: int) -> "Region":
         added=tuple(_known(click.pixel) for click in clicks if not click.removes),
         removed=tuple(_known(click.pixel) for click in clicks if click.removes),
     )
+
+
+def output_space(image: bpy.types.Image) -> str:
+    """Name of the color space that files of an image are to have; empty for the photo's own."""
+    chosen: str = image.dyehouse.output_space
+    return "" if chosen == "PHOTO" else chosen
 
 
 def decimal(value: float) -> float:
@@ -183,7 +215,7 @@ def _white(asked: "DyehousePhoto") -> str | tuple[float, ...] | None:
     if kind == "PIXEL":
         return _pixel(asked.white_pixel)
     if kind == "ILLUMINANT":
-        return asked.white_illuminant
+        return bpy.path.abspath(asked.white_illuminant, library=asked.id_data.library)
     if kind == "TEMPERATURE":
         return f"{asked.white_temperature:g}K"
     if kind == "HIGHLIGHTS":
@@ -194,7 +226,7 @@ def _white(asked: "DyehousePhoto") -> str | tuple[float, ...] | None:
 def _light(asked: "DyehousePhoto") -> str | tuple[float, ...] | None:
     kind = asked.light_source
     if kind == "ILLUMINANT":
-        return asked.light_illuminant
+        return bpy.path.abspath(asked.light_illuminant, library=asked.id_data.library)
     if kind == "TEMPERATURE":
         return f"{asked.light_temperature:g}K"
     return in_photo_space(asked.light_color, asked.id_data) if kind == "COLOR" else None
@@ -349,9 +381,8 @@ def found_color(image: bpy.types.Image, index: int) -> tuple[float, ...]:
     from . import session
 
     look = session.last(image)
-    if look is None or index >= len(look.prepared.analyses):
-        return 0.0, 0.0, 0.0
-    return _shown(look.prepared.analyses[index].reference, look.photo.space)
+    analysis = look.analysis(index) if look else None
+    return _shown(analysis.reference, look.photo.space) if look and analysis else (0.0, 0.0, 0.0)
 
 
 def found_white(image: bpy.types.Image) -> tuple[float, ...]:
@@ -370,9 +401,8 @@ def between(source, destination, color) -> "NDArray[np.float64]":
     """Linear RGB (3,) of one space in another, white to white."""
     import numpy as np
 
-    from ..core.colorimetry import adaptation_matrix, linear_to_xyz, xyz_to_linear
+    from ..core.colorimetry import conversion_matrix
 
     if np.allclose(source.to_xyz, destination.to_xyz, atol=1e-9):
         return np.asarray(color, np.float64)
-    adapted = adaptation_matrix(source.white, destination.white, "bradford") @ linear_to_xyz(list(color), source)
-    return xyz_to_linear(adapted, destination)
+    return conversion_matrix(source, destination) @ np.asarray(color, np.float64)

@@ -40,6 +40,7 @@ def recolor(
     overwrite: bool = False,
     quality: int = 95,
     compression: str | None = None,
+    output_space: str | None = None,
     **asked: Any,
 ) -> bpy.types.Image | Path:
     """Put a product into another color, into a new image or a file; the image's own settings are not used.
@@ -59,6 +60,8 @@ def recolor(
         Replace a file that is there.
     quality, compression
         Of the file, as for `batch.files.write`.
+    output_space
+        Of the file, such as ``"display-p3"``; None for the photo's own.
     asked
         ``reference`` ((x, y) or linear RGB), ``click`` ((x, y)), ``mask``, ``tolerance``, ``model``, ``residual``,
         ``meaning``, ``source``, ``white`` ((x, y), linear RGB, or the name of a light), ``gray``, ``illuminant``,
@@ -80,7 +83,8 @@ def recolor(
     look = look_at(found, target=target, **asked)
     if path is None:
         return writing.to_image(look.photo, look.prepared, name or f"{writing.stem_of(found)}-recolored")[0]
-    writing.save(look.photo, look.prepared, path, overwrite=overwrite, quality=quality, compression=compression)
+    photo = writing.in_space(look.photo, output_space)
+    writing.save(photo, look.prepared, path, overwrite=overwrite, quality=quality, compression=compression)
     return path
 
 
@@ -124,7 +128,8 @@ def write(image: Image, output: str | Path, *, overwrite: bool = False, quality:
     found = _image(image)
     path = writing.check(common.absolute(str(output)), found, overwrite)
     look = session.look(found, recipes.shown(found))
-    writing.save(look.photo, look.prepared, path, overwrite=overwrite, quality=quality or found.dyehouse.quality)
+    photo = writing.in_space(look.photo, recipes.output_space(found))
+    writing.save(photo, look.prepared, path, overwrite=overwrite, quality=quality or found.dyehouse.quality)
     return path
 
 

@@ -5,7 +5,7 @@ undo, redo, a reloaded file or a changed setting need no bookkeeping: what is as
 made. Everything is computed on plain arrays, in a thread of its own when `ready` is asked.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import background, images, masks, recipes
+from . import background, images, masks, recipes, writing
 
 if TYPE_CHECKING:
     from ..batch.files import Photo
+    from ..core.analysis import Analysis
     from ..core.colorspace import RGBSpace
     from ..core.recipe import Prepared, Recipe
 
@@ -28,20 +29,35 @@ class Look:
     Attributes
     ----------
     photo
-        As opened.
+        As opened; for what the panel shows, with the color space of its files as `wanted`.
     prepared
         With the targets and the new light of the recipe that was asked for.
     key
         What the look depends on; equal keys mean the same maps and masks.
+    regions
+        Indices of the panel's regions that it is of, without those that are not picked yet.
     """
 
     photo: "Photo"
     prepared: "Prepared"
     key: tuple[object, ...]
+    regions: tuple[int, ...] = ()
+
+    def place(self, index: int) -> int | None:
+        """Where a region of the panel is among the analyses; None if it is not picked yet."""
+        return self.regions.index(index) if index in self.regions else None
+
+    def analysis(self, index: int) -> "Analysis | None":
+        """What was found for a region of the panel; None if that is not picked yet."""
+        place = self.place(index)
+        return None if place is None else self.prepared.analyses[place]
 
 
 _photos: "background.Worker[Photo]" = background.Worker()
 _looks: "background.Worker[Look]" = background.Worker()
+_told: "background.Worker[tuple[str, ...]]" = background.Worker()
+# Of each image, by its session_uid: the key of the look that was warned of last, and the warnings.
+_told_last: dict[int, tuple[tuple[object, ...], tuple[str, ...]]] = {}
 
 
 def look(
@@ -88,10 +104,13 @@ def ready(image: bpy.types.Image) -> Look | None:
     DyehouseError
         If it cannot be made.
     """
-    recipe, sources = recipes.recipe_of(image), masks.sources(image, hurry=True)
-    key = _key(image, recipe, sources, hurry=True)
+    recipe, indices = recipes.recipe_so_far(image)
+    sources = masks.sources(image, True, indices)
+    key = _key_in_hurry(image, recipe, sources)
+    if key is None:
+        return None
     found = _looks.ask(key, partial(_begin, image, recipe, sources, key))
-    return None if found is None else _asking(found, recipe)
+    return None if found is None else _shown(image, _asking(found, recipe), indices)
 
 
 def last(image: bpy.types.Image) -> Look | None:
@@ -99,11 +118,23 @@ def last(image: bpy.types.Image) -> Look | None:
     from ..core.errors import DyehouseError
 
     try:
-        recipe, sources = recipes.recipe_of(image), masks.sources(image, hurry=True)
-        found = _looks.found(_key(image, recipe, sources, hurry=True))
+        recipe, indices = recipes.recipe_so_far(image)
+        key = _key_in_hurry(image, recipe, masks.sources(image, True, indices))
+        found = None if key is None else _looks.found(key)
     except (DyehouseError, OSError):
         return None
-    return None if found is None else _asking(found, recipe)
+    return None if found is None else _shown(image, _asking(found, recipe), indices)
+
+
+def warnings(image: bpy.types.Image, look: Look | None) -> Sequence[str]:
+    """What may go wrong with what a look shows, in words: found in a thread, and till then the words of before."""
+    if look is None:
+        return ()
+    told = _told.ask((look.key, look.prepared.recipe), lambda: lambda: tuple(look.prepared.warnings))
+    if told is not None:
+        _told_last[image.session_uid] = look.key, told
+    key, words = _told_last.get(image.session_uid, (None, ()))
+    return words if key == look.key else ()
 
 
 def busy() -> bool:
@@ -130,7 +161,8 @@ def photo_ready(image: bpy.types.Image) -> "Photo | None":
     DyehouseError
         If the image cannot be opened.
     """
-    return _photos.ask(images.version_of(image, hurry=True), partial(images.loader, image))
+    version = images.version_of(image, hurry=True)
+    return None if version is None else _photos.ask(version, partial(images.loader, image))
 
 
 def space_of(image: bpy.types.Image) -> "RGBSpace":
@@ -142,13 +174,23 @@ def forget() -> None:
     """Drop everything: another .blend is opened, or the extension is disabled."""
     _photos.forget()
     _looks.forget()
+    _told.forget()
+    _told_last.clear()
 
 
-def _key(
-    image: bpy.types.Image, recipe: "Recipe", sources: "Mapping[str, masks.Source]", hurry: bool = False
-) -> tuple[object, ...]:
+def _key(image: bpy.types.Image, recipe: "Recipe", sources: "Mapping[str, masks.Source]") -> tuple[object, ...]:
     covered = tuple((name, source.version) for name, source in sources.items())
-    return images.version_of(image, hurry), recipe.footing(), covered
+    return images.version_of(image), recipe.footing(), covered
+
+
+def _key_in_hurry(
+    image: bpy.types.Image, recipe: "Recipe", sources: "Mapping[str, masks.Source]"
+) -> tuple[object, ...] | None:
+    """The same from `sources` in a hurry, None if pixels are still to be looked at."""
+    version = images.version_of(image, hurry=True)
+    covered = tuple((name, source.version) for name, source in sources.items())
+    known = version is not None and all(source.version is not None for source in sources.values())
+    return (version, recipe.footing(), covered) if known else None
 
 
 def _begin(
@@ -170,7 +212,14 @@ def _look(
     from ..batch.photo import look as look_at
 
     photo = _photos.now(key[0], lambda: load)
-    return Look(photo, look_at(photo, recipe, read_mask=lambda name: loaders[name]()), key)
+    prepared = look_at(photo, recipe, read_mask=lambda name: loaders[name]())
+    for analysis in prepared.analyses:  # what the window would wait for when it is drawn
+        _ = analysis.mask, analysis.extra, analysis.report
+    return Look(photo, prepared, key)
+
+
+def _shown(image: bpy.types.Image, look: Look, indices: tuple[int, ...]) -> Look:
+    return replace(look, photo=writing.in_space(look.photo, recipes.output_space(image)), regions=indices)
 
 
 def _asking(look: Look, recipe: "Recipe") -> Look:

@@ -1,5 +1,6 @@
 """The swatch book in Blender: one book for the session, what the browser shows of it, and icons of colors."""
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -73,6 +74,7 @@ class DyehouseBrowser(bpy.types.PropertyGroup):
         name="Search", description="Words of the swatch's name", options={"TEXTEDIT_UPDATE"}, update=_first_page
     )
     page: IntProperty(name="Page", min=0)
+    palette: StringProperty(name="Palette", description="Palette of this .blend, to make a library of")
 
 
 def browser() -> DyehouseBrowser:
@@ -107,9 +109,15 @@ def shown(target: "Swatch | None") -> "list[Hit]":
 
 def icon_of(swatch: "Swatch") -> int:
     """Icon id of a swatch's color; 0 in background, where Blender draws none."""
+    return icon_of_color(codes_of(swatch))
+
+
+@lru_cache(maxsize=4096)
+def codes_of(swatch: "Swatch") -> tuple[float, ...]:
+    """SRGB codes 0..1 to show a swatch by: found once, and not for forty swatches whenever the panel is drawn."""
     from ..core.library import Library
 
-    return icon_of_color(tuple(Library.of("", [swatch]).display_colors[0]))
+    return tuple(Library.of("", [swatch]).display_colors[0])
 
 
 def icon_of_color(codes: tuple[float, ...]) -> int:

@@ -1,6 +1,7 @@
 """Recolored photos as files and as images of the .blend."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..batch.files import Photo
+    from ..core.colorspace import RGBSpace
     from ..core.recipe import Colorway, Prepared
     from ..core.recolor import Shares
 
@@ -75,6 +77,19 @@ def check(path: Path, image: bpy.types.Image, overwrite: bool) -> Path:
     if not overwrite and (path.exists() or path.is_symlink()):
         raise FileError(f"'{path}' exists already: choose another name, or allow it to be overwritten.")
     return path
+
+
+def in_space(photo: "Photo", name: str | None) -> "Photo":
+    """The photo, to be written in a color space by its name; in its own without a name.
+
+    Raises
+    ------
+    ImageError
+        If there is no such space.
+    """
+    from ..core.colorspace import space_named
+
+    return replace(photo, wanted=space_named(name) if name else None)
 
 
 def begin(
@@ -213,11 +228,15 @@ def save_mask(path: Path, coverage: "NDArray") -> None:
 
 
 def begin_image(
-    photo: "Photo", prepared: "Prepared", name: str, watch: Callable[[float], None] | None = None
+    photo: "Photo",
+    prepared: "Prepared",
+    name: str,
+    working: "RGBSpace",
+    watch: Callable[[float], None] | None = None,
 ) -> "Callable[[], tuple[bpy.types.Image, Shares]]":
     """Recolor a photo for a new image of the .blend, in any thread; the main thread has to call what is returned.
 
-    The image has the same pixels as a file of the photo's own kind.
+    The image has the same pixels as a file of the photo's own kind. `working` is from `images.working_space`.
     """
     from ..batch import files
     from ..batch import photo as photos
@@ -225,12 +244,13 @@ def begin_image(
     kind = "image.tif"  # holds every kind of pixels
     pixels, shares = photos.recolored(photo, prepared, kind, watch=watch)
     premultiplied = files.output_premultiplied(kind, photo)
-    return lambda: (images.new_image(name, pixels, files.output_space(kind, photo), premultiplied), shares)
+    make = images.image_maker(name, pixels, files.output_space(kind, photo), premultiplied, working)
+    return lambda: (make(), shares)
 
 
 def to_image(photo: "Photo", prepared: "Prepared", name: str) -> "tuple[bpy.types.Image, Shares]":
     """Recolor a photo into a new image of the .blend; see :func:`begin_image`."""
-    return begin_image(photo, prepared, name)()
+    return begin_image(photo, prepared, name, images.working_space())()
 
 
 def verified(photo: "Photo", prepared: "Prepared", path: Path) -> list[str]:

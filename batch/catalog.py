@@ -51,7 +51,7 @@ class Settings:
         Do only what an earlier run has left, or what has changed since.
     force
         Make everything anew.
-    max_error, allow_warnings, sheets
+    max_error, allow_warnings, sheets, verify
         See :class:`work.Task`.
     journal
         The journal; None for one in the output folder.
@@ -66,6 +66,7 @@ class Settings:
     max_error: float | None = None
     allow_warnings: bool = False
     sheets: bool = True
+    verify: bool = True
     journal: str | None = None
 
 
@@ -107,7 +108,7 @@ class Run:
         self.journal = Journal(Path(settings.journal or Path(out) / JOURNAL))
         try:
             self._clean()
-            if self.journal.entries and not (settings.resume or settings.force):
+            if self.journal and not (settings.resume or settings.force):
                 raise FileError(f"'{out}' holds an earlier run: give --resume to go on, or --force to make all anew.")
             self.journal.share()
         except BaseException:
@@ -169,14 +170,15 @@ class Run:
     def _tasks(self) -> Iterator[list[Any]]:
         from .work import Task
 
-        settings, known = self.settings, self.journal.entries
+        settings, known = self.settings, self.journal
         out = settings.out if storage.is_url(settings.out) else str(Path(settings.out).absolute())
         threads = 1 if settings.scheduler else None
         some = []
         for job in self.jobs:
             names = [job.sheet, *(want.output for want in job.wants)]
             before = {name: known[name] for name in names if name in known} if settings.resume else {}
-            some.append(Task(job, out, before, settings.max_error, settings.allow_warnings, settings.sheets, threads))
+            gate = settings.max_error, settings.allow_warnings
+            some.append(Task(job, out, before, *gate, settings.sheets, settings.verify, threads))
             if len(some) == settings.per_task:
                 yield some
                 some = []
@@ -186,9 +188,8 @@ class Run:
     def _write_page(self) -> None:
         from . import page
 
-        names = {name for job in self.jobs for name in (job.sheet, *(want.output for want in job.wants))}
-        entries = {name: entry for name, entry in self.journal.entries.items() if name in names}
-        text = page.run_page(entries, self.settings.out)
+        names = [name for job in self.jobs for name in (job.sheet, *(want.output for want in job.wants))]
+        text = page.run_page(self.journal, [name for name in names if name in self.journal], self.settings.out)
         with storage.arriving(storage.join(self.settings.out, PAGE)) as place:
             beside = place.with_name(f".dyehouse-{secrets.token_hex(6)}.html")
             try:
@@ -282,7 +283,7 @@ def command_line(options: argparse.Namespace) -> int:
         return 2
     names = ("workers", "scheduler", "per_task", "resume", "force", "max_error", "allow_warnings", "journal")
     chosen = {name: getattr(options, name) for name in names}
-    run = Run(jobs, Settings(options.out, sheets=not options.no_sheets, **chosen))
+    run = Run(jobs, Settings(options.out, sheets=not options.no_sheets, verify=not options.no_verify, **chosen))
     return _watched(run, options)
 
 

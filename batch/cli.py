@@ -104,6 +104,7 @@ def _add_batch(commands: Any) -> None:
     command.add_argument("--max-error", type=float, metavar="D", help="set aside what is predicted to be farther off")
     command.add_argument("--allow-warnings", action="store_true", help="do not set aside for warnings alone")
     command.add_argument("--no-sheets", action="store_true", help="no contact sheets and no page")
+    command.add_argument("--no-verify", action="store_true", help="do not check the color of the written files")
     command.add_argument("--journal", metavar="FILE", help="the run's journal (default: in the output folder)")
     command.add_argument("--quiet", action="store_true", help="print only what went wrong")
     command.add_argument("--json", action="store_true", help="print a JSON object a line, for machines")
@@ -358,7 +359,7 @@ def _asked(options: argparse.Namespace) -> tuple[Recipe, str | None]:
         if getattr(options, name) != plain[name]:
             raise RecipeError(f"--{name} and --recipe contradict each other: write it into the recipe file.")
     stored = read_recipe(options.recipe)
-    for name in ("quality", "compression"):
+    for name in ("quality", "compression", "output_space"):
         if name in options and getattr(options, name) == plain[name]:
             setattr(options, name, getattr(stored.output, name))
     recipe, found = stored.located(), {colorway.name: colorway for colorway in stored.recipe.colorways}
@@ -380,9 +381,10 @@ def _recolor(options: argparse.Namespace) -> int:
     if not 1 <= options.quality <= 100:
         raise RecipeError(f"Quality {options.quality} is not in 1..100: 95 is very good.")
     files.check_output(options.output, source=options.photo, force=options.force)
-    wanted = space_named(options.output_space) if options.output_space else None
+    if options.output_space:
+        space_named(options.output_space)  # says in words if there is none, before the photo is looked at
     opened, prepared = _open(options)
-    opened.wanted = wanted
+    opened.wanted = space_named(options.output_space) if options.output_space else None
     figures = inspection.report(opened, prepared)  # before the photo's pixels are used up
     expected = None if options.no_verify else verification.expect(opened, prepared)
     written, shares = photo.save(

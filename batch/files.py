@@ -144,7 +144,12 @@ class Decoded:
 
 
 def read(
-    path: str | Path, color_space: str | None = None, *, upright: bool = True, decoded: Decoded | None = None
+    path: str | Path,
+    color_space: str | None = None,
+    *,
+    upright: bool = True,
+    decoded: Decoded | None = None,
+    rows: int | None = None,
 ) -> Photo:
     """Read a picture.
 
@@ -164,6 +169,8 @@ def read(
         Turn the picture by its EXIF orientation.
     decoded
         The pixels, where another decoder than OpenImageIO has read them already.
+    rows
+        Decode so many rows from the top, or all of them where that saves nothing; None for all.
 
     Raises
     ------
@@ -178,7 +185,7 @@ def read(
     if path.suffix.lower() in RAW_EXTENSIONS:
         return _read_raw(path, color_space)
     blocks = _extract(path)
-    found = decoded or _decode(path, blocks)
+    found = decoded or _decode(path, blocks, rows)
     pixels, kind, notes, associated, grey = found.pixels, found.kind, found.notes, found.associated, found.grey
     orientation = blocks.orientation
     if upright:
@@ -242,7 +249,7 @@ def kind_of(path: Path, blocks: Blocks) -> str:
     return kind
 
 
-def _decode(path: Path, blocks: Blocks) -> Decoded:
+def _decode(path: Path, blocks: Blocks, rows: int | None = None) -> Decoded:
     import OpenImageIO
 
     kind = kind_of(path, blocks)
@@ -263,7 +270,11 @@ def _decode(path: Path, blocks: Blocks) -> Decoded:
             notes.append(f"'{path.name}' has more than one picture: only the first is used.")
         picked = [*color, alpha] if alpha is not None else color
         first, last = min(picked), max(picked) + 1
-        pixels = source.read_image(part, 0, first, last, _sample_type(spec, picked, path))
+        sample = _sample_type(spec, picked, path)
+        if rows is None or rows >= spec.height or blocks.orientation != 1 or spec.tile_width:
+            pixels = source.read_image(part, 0, first, last, sample)
+        else:
+            pixels = source.read_scanlines(part, 0, spec.y, spec.y + rows, 0, first, last, sample)
         error = source.geterror()
         # The JPEG decoder delivers grey rows for what is missing, and only tells so.
         if pixels is None or error:

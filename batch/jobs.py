@@ -18,7 +18,7 @@ from typing import Any
 
 from ..core.errors import DyehouseError, FileError, RecipeError
 from ..core.recipe import Colorway, Recipe, with_colorway
-from ..core.recipe_file import RecipeFileError, StoredRecipe, exact_form, read_recipe
+from ..core.recipe_file import RecipeFileError, StoredRecipe, exact_form, measured, read_recipe
 from . import files, storage
 
 TABLES = (".csv", ".tsv", ".jsonl", ".ndjson")
@@ -56,6 +56,8 @@ class Want:
         Where it goes, relative to the output folder, with ``/``.
     quality, compression
         As for `files.write`.
+    output_space
+        Name of the space of the file; None for the photo's own.
     source
         Where it was asked for, such as ``catalog.csv, row 3``.
     """
@@ -64,6 +66,7 @@ class Want:
     output: str
     quality: int
     compression: str | None
+    output_space: str | None
     source: str
 
 
@@ -97,16 +100,15 @@ class Job:
 
     def settings(self, want: Want) -> str:
         """Hash of everything but the files that one result depends on."""
-        form = [exact_form(self.recipe_for(want)), self.color_space, want.quality, want.compression, want.output]
+        written = want.quality, want.compression, want.output_space, want.output
+        form = [exact_form(self.recipe_for(want)), self.color_space, *written]
         return hashlib.sha256(json.dumps(form, sort_keys=True).encode()).hexdigest()
 
     @property
     def inputs(self) -> list[str]:
         """Paths or URLs of the files that the job reads, the photo first."""
         masks = [r.mask for r in self.recipe.regions if isinstance(r.mask, str) and r.mask not in ("click", "alpha")]
-        camera = self.recipe.camera
-        named = [camera] if camera is not None and camera.lower().endswith(".csv") else []
-        return list(dict.fromkeys([self.photo, *masks, *named]))
+        return list(dict.fromkeys([self.photo, *masks, *measured(self.recipe).values()]))
 
 
 class Gathering:
@@ -167,8 +169,9 @@ class Gathering:
                 group = self._groups[key] = (photo, stored.color_space, kept[1], [])
             named = PurePosixPath(photo) if storage.is_url(photo) else Path(photo)
             for colorway in colorways:
-                output = stored.output.named(named.stem, colorway.name, named.parent.name)
-                group[3].append(Want(colorway, output, stored.output.quality, stored.output.compression, source))
+                asked = stored.output
+                output = asked.named(named.stem, colorway.name, named.parent.name)
+                group[3].append(Want(colorway, output, asked.quality, asked.compression, asked.output_space, source))
 
     def jobs(self) -> list[Job]:
         """Return the jobs in the order of their photos' first mention, and note results that cannot be."""

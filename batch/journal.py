@@ -6,7 +6,7 @@ import contextlib
 import json
 import os
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -16,18 +16,16 @@ from ..core.errors import FileError
 _PATIENCE = 20.0
 
 
-class Journal:
+class Journal(Mapping[str, dict[str, Any]]):
     """The journal of one output folder, open for appending and locked against other runs.
+
+    A mapping from outputs to their last entries, which stay in the file: of a hundred thousand results only the names
+    are in memory.
 
     Parameters
     ----------
     path
         The file; made if it is not there.
-
-    Attributes
-    ----------
-    entries
-        The last entry of each result, by its output.
 
     Raises
     ------
@@ -46,17 +44,26 @@ class Journal:
         except FileError:
             self._file.close()
             raise
-        self.entries: dict[str, dict[str, Any]] = {}
+        self._places: dict[str, int] = {}
         self._file.seek(0)
-        data = self._file.read()
-        for line in data.splitlines():
-            try:
-                entry = json.loads(line)
-                self.entries[entry["output"]] = entry
-            except (ValueError, KeyError, TypeError):
-                continue  # a line that was being written when the machine stopped
-        if data and not data.endswith(b"\n"):
-            self._file.write(b"\n")
+        self._end, line = 0, b"\n"
+        for line in self._file:
+            with contextlib.suppress(ValueError, KeyError, TypeError):  # cut off when the machine stopped
+                self._places[json.loads(line)["output"]] = self._end
+            self._end += len(line)
+        if not line.endswith(b"\n"):
+            self._end += self._file.write(b"\n")
+
+    def __getitem__(self, output: str) -> dict[str, Any]:
+        self._file.seek(self._places[output])
+        entry: dict[str, Any] = json.loads(self._file.readline())
+        return entry
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
 
     def share(self) -> None:
         """Let the workers of this run in, too."""
@@ -70,18 +77,20 @@ class Journal:
         FileError
             If they cannot be written.
         """
-        lines = []
+        lines, places = [], {}
         for entry in entries:
-            self.entries[entry["output"]] = entry
-            lines.append(json.dumps(entry, ensure_ascii=False) + "\n")
+            places[entry["output"]] = self._end
+            lines.append(json.dumps(entry, ensure_ascii=False).encode(errors="surrogateescape") + b"\n")
+            self._end += len(lines[-1])
         try:
-            self._file.write("".join(lines).encode(errors="surrogateescape"))
+            self._file.write(b"".join(lines))
             self._file.flush()
             os.fsync(self._file.fileno())
         except OSError as error:
             raise FileError(
                 f"The journal '{self.path}' cannot be written ({error.strerror}): make room, then go on with --resume."
             ) from None
+        self._places |= places
 
     def close(self) -> None:
         """Close the file and give up the lock."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 import base64
 import html
 import json
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
 
 from ..core.errors import FileError
 from . import storage
@@ -23,23 +22,27 @@ MOST_PICTURES = 200
 _ORDER = {"failed": 0, "needs a person": 1, "done": 2}
 
 
-def worst_first(entries: Iterable[Entry]) -> list[Entry]:
-    """Results in the order in which a person should look at them: failed, set aside, then by predicted error."""
+def worst_first(entries: Mapping[str, Entry], names: Iterable[str]) -> list[str]:
+    """Names of results in the order in which a person should look at them: failed, set aside, by predicted error."""
 
-    def key(entry: Entry) -> tuple[int, float, int, str]:
+    def key(name: str) -> tuple[int, float, int, str]:
+        entry = entries[name]
         error = entry.get("predicted_error", {}).get("bound90", 0.0)
-        return _ORDER.get(entry["status"], 2), -error, -len(entry.get("warnings", ())), entry["output"]
+        return _ORDER.get(entry["status"], len(_ORDER)), -error, -len(entry.get("warnings", ())), name
 
-    return sorted((entry for entry in entries if entry["status"] in _ORDER), key=key)
+    ordered = sorted(map(key, names))
+    return [name for order, *_, name in ordered if order < len(_ORDER)]
 
 
-def run_page(entries: Mapping[str, Entry], out: str, most: int = MOST_PICTURES) -> str:
+def run_page(entries: Mapping[str, Entry], names: Sequence[str], out: str, most: int = MOST_PICTURES) -> str:
     """Write the page.
 
     Parameters
     ----------
     entries
-        Of results and contact sheets, by output.
+        Of results and contact sheets, by output; looked up one at a time.
+    names
+        Those that the page is about.
     out
         Output folder or URL, where the sheets are.
     most
@@ -49,22 +52,22 @@ def run_page(entries: Mapping[str, Entry], out: str, most: int = MOST_PICTURES) 
     -------
     HTML.
     """
-    results = worst_first(entries.values())
-    cells = {
-        output: (sheet, index)
-        for sheet in entries.values()
-        if sheet["status"] == "sheet"
-        for index, output in enumerate(sheet["cells"], 1)
-    }
+    cells: dict[str, tuple[str, list[int], int]] = {}
+    for entry in map(entries.__getitem__, names):
+        if entry["status"] == "sheet":
+            cells |= {output: (entry["file"], entry["cell"], k) for k, output in enumerate(entry["cells"], 1)}
+    counts = dict.fromkeys(_ORDER, 0)
     pictures: dict[str, str] = {}
     rows = []
-    for entry in results:
-        sheet, index = cells.get(entry["output"], ({}, 0))
-        name = sheet.get("file", "")
-        if name and name not in pictures and len(pictures) < most and (data := _data(storage.join(out, name))):
-            pictures[name] = data
-        rows.append(_row(entry, sheet if name in pictures else {}, index))
-    counts = {status: sum(entry["status"] == status for entry in results) for status in _ORDER}
+    for name in worst_first(entries, names):
+        entry, slider = entries[name], ""
+        counts[entry["status"]] += 1
+        if name in cells:
+            sheet, cell, index = cells[name]
+            if sheet not in pictures and len(pictures) < most and (data := _data(storage.join(out, sheet))):
+                pictures[sheet] = data
+            slider = _slider(sheet, cell, index) if sheet in pictures else ""
+        rows.append(_row(entry, slider))
     headline = f"{counts['done']} done, {counts['needs a person']} need a person, {counts['failed']} failed"
     return _PAGE.format(headline=headline, rows="\n".join(rows), pictures=json.dumps(pictures).replace("<", "\\u003c"))
 
@@ -77,26 +80,31 @@ def _data(path: str) -> str:
         return ""  # the sheet was removed; the result is listed without it
 
 
-def _row(entry: Entry, sheet: Mapping[str, Any], index: int) -> str:
+def _row(entry: Entry, slider: str) -> str:
     error = entry.get("predicted_error", {})
-    figures = (
-        f"predicted CIEDE2000 {error['median']:.2f}, 90 % of the pixels below {error['bound90']:.2f}" if error else ""
-    )
+    figures = []
+    if error:
+        figures.append(
+            f"predicted CIEDE2000 {error['median']:.2f}, 90 % of the pixels below {error['bound90']:.2f}",
+        )
+    for check in entry.get("verification", ()):
+        delivered = f"delivered {check['ciede2000']:.2f} from {check['target'] or 'the unchanged color'}"
+        nearest = f" (the file can hold none nearer than {check['limit_ciede2000']:.2f})"
+        figures.append(delivered + (nearest if check["limit_ciede2000"] > 0 else ""))
     said = [entry.get("reason", ""), *entry.get("warnings", ()), *entry.get("notes", ())]
     notes = "".join(f"<li>{html.escape(text)}</li>" for text in dict.fromkeys(said) if text)
     title = html.escape(f"{storage.name_of(entry['photo'])}, {entry['colorway']}")
     link = f'<a href="{html.escape(_quoted(entry["file"]))}">{title}</a>' if entry.get("file") else title
     return (
-        f'<article data-status="{entry["status"]}" data-error="{error.get("bound90", "")}">{_slider(sheet, index)}'
+        f'<article data-status="{entry["status"]}" data-error="{error.get("bound90", "")}">{slider}'
         f'<div><h2>{link}</h2><p><b class="{entry["status"].split()[0]}">{entry["status"]}</b> '
-        f"{html.escape(', '.join(entry.get('model', ())))} {figures}</p><ul>{notes}</ul></div></article>"
+        f"{html.escape(', '.join(entry.get('model', ())))} {html.escape('; '.join(figures))}</p><ul>{notes}</ul></div>"
+        "</article>"
     )
 
 
-def _slider(sheet: Mapping[str, Any], index: int) -> str:
-    if not sheet:
-        return ""
-    width, height = sheet["cell"]
+def _slider(sheet: str, cell: Sequence[int], index: int) -> str:
+    width, height = cell
 
     def part(number: int, kind: str) -> str:
         row, column = divmod(number, ACROSS)
@@ -104,7 +112,7 @@ def _slider(sheet: Mapping[str, Any], index: int) -> str:
         return f'<i class="{kind}" style="background-position:-{left}px -{top}px"></i>'
 
     return (
-        f'<figure data-sheet="{html.escape(sheet["file"])}" style="width:{width}px;height:{height}px">'
+        f'<figure data-sheet="{html.escape(sheet)}" style="width:{width}px;height:{height}px">'
         f"{part(index, 'after')}{part(0, 'before')}"
         '<input type="range" min="0" max="100" value="50" aria-label="before and after"></figure>'
     )

@@ -12,9 +12,10 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..core.colorimetry import conversion_matrix
 from ..core.compositing import Edge
+from ..core.palette import Palette
 from ..core.picture import Picture
 from ..core.recipe import Prepared, Recipe, prepare
-from ..core.recolor import Recoloring, Shares
+from ..core.recolor import Recoloring, RegionMatrix, Shares, shared_palette
 from ..core.swatches import Swatch
 from . import files
 
@@ -91,6 +92,12 @@ def turned_recipe(recipe: Recipe, shape: Sequence[int], orientation: int, back: 
     return replace(recipe, regions=tuple(regions), white=moved(recipe.white))
 
 
+def palette(prepared: Prepared) -> Palette | None:
+    """Colors of the photo that all its colorways share; None where they are no help."""
+    regions = [RegionMatrix(np.eye(3), a.mask, a.edge, a.extra) for a in prepared.analyses]
+    return shared_palette(prepared.analyses[0].picture, regions)
+
+
 def recoloring(
     photo: files.Photo,
     prepared: Prepared,
@@ -100,6 +107,7 @@ def recoloring(
     reuse: bool = False,
     out: NDArray | None = None,
     threads: int | None = None,
+    palette: Palette | None = None,
 ) -> Recoloring:
     """Set up the recolor of a photo into the pixels that the output file wants.
 
@@ -117,6 +125,8 @@ def recoloring(
         Array of an earlier colorway of the same photo and kind of output, to be overwritten.
     threads
         None for one per core.
+    palette
+        From :func:`palette`, for several colorways; None for one.
     """
     dtype, space = files.output_dtype(path, photo), files.output_space(path, photo)
     height, width, channels = photo.pixels.shape
@@ -139,7 +149,9 @@ def recoloring(
     if channels == 4 and out is not photo.pixels:
         out[..., 3] = converted(photo.pixels[..., 3], dtype)
     convert = None if photo.wanted is None else conversion_matrix(photo.space, space)
-    return Recoloring(picture, regions, curve=space.curve, dtype=dtype, out=out, threads=threads, convert=convert)
+    return Recoloring(
+        picture, regions, curve=space.curve, dtype=dtype, out=out, threads=threads, convert=convert, palette=palette
+    )
 
 
 def _watched(job: Recoloring, watch: Callable[[float], None] | None) -> Iterator[int]:

@@ -39,8 +39,7 @@ def about(prepared: Prepared, index: int) -> dict[str, Any]:
     looks = metamerism.under_lights(swatch, observer=recipe.observer)
     found["looks"] = [{"light": k.light, "lab": k.lab.tolist(), "shift_ciede2000": k.shift} for k in looks]
     if region.source is not None and isinstance(region.source.color, Spectrum):
-        tests = [name for name in metamerism.LIGHTS if name != "D65"]
-        indices = [metamerism.special_index(region.source, swatch, name, "D65", recipe.observer) for name in tests]
+        indices = metamerism.special_indices(region.source, swatch, observer=recipe.observer)
         found["metamerism"] = [{"test": i.test, "index": i.value, "sentence": i.sentence} for i in indices]
     return found
 

@@ -29,9 +29,11 @@ from . import files
 
 # Pixels that are looked at for matte ones, and how near to the reference these are: A around 1, and the rest of every
 # channel (gloss, residual) as a share of the reference.
-_CANDIDATES = 60_000
+_CANDIDATES = 20_000
 _BODY, _OFF = 0.2, 0.1
-_FEWEST, _MOST = 25, 400
+
+# Pixels that are averaged, and how many times as many they are chosen from.
+_FEWEST, _MOST, _CHOICE = 25, 400, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +94,17 @@ class Verification:
 
 
 @dataclass(frozen=True, eq=False)
-class _Area:
-    """Matte pixels of a region, and the linear RGB that the product shall have there."""
+class Area:
+    """Matte pixels of a region.
 
-    target: str | None
-    asked: NDArray[np.float64]
+    Attributes
+    ----------
+    rows, columns
+        (n,) positions.
+    body, gloss
+        (n,) float32 A and B in the photo.
+    """
+
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
     body: NDArray[np.float32]
@@ -113,13 +121,14 @@ class Expectation:
         RGB space of the asked colors.
     white
         (3,) W' of the new picture.
-    areas
-        One for each region that has matte pixels.
+    asked
+        For each region that has matte pixels: these, the (3,) linear RGB that the product shall have there, and the
+        swatch as its user wrote it.
     """
 
     space: RGBSpace
     white: NDArray[np.float64]
-    areas: tuple[_Area, ...]
+    asked: tuple[tuple[Area, NDArray[np.float64], str | None], ...]
 
     def check(self, path: str | Path) -> list[Verification]:
         """Read the file back and compare.
@@ -138,13 +147,17 @@ class Expectation:
         FileError
             If it cannot be read back, or has another size.
         """
-        back = files.read(path)
-        picture = Picture(back.pixels, back.space.curve)
+        if not self.asked:
+            return []
+        # Decoders go from the top to the bottom, and not further than they must.
+        back = files.read(path, rows=1 + max(int(area.rows.max()) for area, _, _ in self.asked))
         to_own = colorimetry.conversion_matrix(self.space, back.space)
-        return [_compare(area, picture, back, to_own @ area.asked, to_own @ self.white) for area in self.areas]
+        white = to_own @ self.white
+        return [_compare(area, back, to_own @ asked, white, target) for area, asked, target in self.asked]
 
 
-def _compare(area: _Area, picture: Picture, back: files.Photo, asked: NDArray, white: NDArray) -> Verification:
+def _compare(area: Area, back: files.Photo, asked: NDArray, white: NDArray, target: str | None) -> Verification:
+    picture = Picture(back.pixels, back.space.curve)
     height, width = picture.shape
     if area.rows.max() >= height or area.columns.max() >= width:
         raise FileError(f"'{back.path}' is {width} x {height} pixels, less than was written: write it again.")
@@ -152,7 +165,7 @@ def _compare(area: _Area, picture: Picture, back: files.Photo, asked: NDArray, w
     if back.premultiplied and back.pixels.shape[2] == 4:
         pixels = pixels / np.asarray(back.pixels[area.rows, area.columns, 3:], np.float32)
     matte = (pixels - area.gloss[:, None] * white) / area.body[:, None]
-    return _verification(area.target, asked, trimmed_mean(matte), back, len(matte))
+    return _verification(target, asked, trimmed_mean(matte), back, len(matte))
 
 
 def _verification(
@@ -163,7 +176,12 @@ def _verification(
     return Verification(target, asked_lab, delivered_lab, limit, pixels)
 
 
-def expect(photo: files.Photo, prepared: Prepared, swatches: Sequence[Swatch | None] | None = None) -> Expectation:
+def expect(
+    photo: files.Photo,
+    prepared: Prepared,
+    swatches: Sequence[Swatch | None] | None = None,
+    areas: Sequence[Area | None] | None = None,
+) -> Expectation:
     """Note what a recolor should deliver, and where to look for it.
 
     Parameters
@@ -172,27 +190,29 @@ def expect(photo: files.Photo, prepared: Prepared, swatches: Sequence[Swatch | N
         The opened photo and what was made of it, its pixels not yet reused.
     swatches
         Targets of this colorway; None for the recipe's own.
+    areas
+        From :func:`matte_areas`, for several colorways of one photo; None to look for them.
     """
-    alpha = photo.pixels[..., 3] if photo.pixels.shape[2] == 4 else None
     chosen = swatches or [None] * len(prepared.analyses)
-    areas = []
-    for k, analysis in enumerate(prepared.analyses):
-        swatch = chosen[k] or prepared.recipe.regions[k].target
-        covers = [later.mask for later in prepared.analyses[k + 1 :]]
-        rows, columns, body, gloss = _matte_pixels(analysis, covers, alpha)
-        if len(rows):
-            asked = prepared.target(k, chosen[k])
-            areas.append(_Area(str(swatch) if swatch else None, asked, rows, columns, body, gloss))
-    return Expectation(prepared.space, np.asarray(prepared.target_white, np.float64), tuple(areas))
+    asked = []
+    for k, area in enumerate(matte_areas(photo, prepared) if areas is None else areas):
+        if area is not None:
+            swatch = chosen[k] or prepared.recipe.regions[k].target
+            asked.append((area, prepared.target(k, chosen[k]), str(swatch) if swatch else None))
+    return Expectation(prepared.space, np.asarray(prepared.target_white, np.float64), tuple(asked))
 
 
-def _matte_pixels(
-    analysis: Analysis, covers: Sequence[NDArray | None], alpha: NDArray | None
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32], NDArray[np.float32]]:
-    """Rows, columns, A and B of pixels of the region that look like its reference."""
-    empty = np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0, np.float32), np.empty(0, np.float32)
+def matte_areas(photo: files.Photo, prepared: Prepared) -> list[Area | None]:
+    """Find the matte pixels of every region; None for one that has none. They do not depend on the targets."""
+    alpha = photo.pixels[..., 3] if photo.pixels.shape[2] == 4 else None
+    analyses = prepared.analyses
+    return [_matte_area(a, [later.mask for later in analyses[k + 1 :]], alpha) for k, a in enumerate(analyses)]
+
+
+def _matte_area(analysis: Analysis, covers: Sequence[NDArray | None], alpha: NDArray | None) -> Area | None:
+    """Pixels of the region that look like its reference."""
     if any(cover is None for cover in covers):
-        return empty  # another region lies over all of it
+        return None  # another region lies over all of it
     picture = analysis.picture
     rows, columns = _candidates(analysis)
     keep = np.ones(len(rows), bool)
@@ -207,7 +227,7 @@ def _matte_pixels(
     unclipped = pixels.max(axis=1, initial=0) < picture.clip_level
     rows, columns, pixels = rows[unclipped], columns[unclipped], pixels[unclipped]
     if not len(rows):
-        return empty
+        return None
     # The plain model chooses them, whatever the photo is recolored by: where it fits, all models agree.
     V, W = analysis.reference, analysis.white
     model = "dichromatic" if stability.noise_gain(V, W) < LARGEST_NOISE_GAIN else "body"
@@ -215,11 +235,14 @@ def _matte_pixels(
     # Channel by channel, as a weak channel of the old color may be a strong one of the new.
     off = np.abs(pixels - body[:, None] * V) / np.maximum(np.abs(V), 0.02 * np.abs(V).max())
     unlike = np.maximum(np.abs(body - 1) / _BODY, off.max(axis=1) / _OFF)
-    # The nearest ones: the color of a product varies, and the reference is one of its colors.
-    order = np.argsort(unlike, kind="stable")
-    alike = order[: np.clip(np.count_nonzero(unlike < 1), _FEWEST, _MOST)]
+    # The color of a product varies, and the reference is one of its colors: the nearest ones, of the first rows that
+    # have enough of them, so that not all of the file need be decoded.
+    near = np.flatnonzero(unlike < 1)[: _CHOICE * _MOST]
+    if len(near) < _FEWEST:
+        near = np.argsort(unlike, kind="stable")[:_FEWEST]
+    alike = near[np.argsort(unlike[near], kind="stable")[:_MOST]]
     alike = alike[body[alike] > 0.1]
-    return rows[alike], columns[alike], body[alike], gloss[alike]
+    return Area(rows[alike], columns[alike], body[alike], gloss[alike]) if len(alike) else None
 
 
 def _candidates(analysis: Analysis) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

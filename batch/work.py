@@ -13,8 +13,10 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.colorspace import space_named
 from ..core.errors import DyehouseError, FileError
 from ..core.recipe import Colorway, Prepared
+from ..core.recipe_file import measured
 from ..core.thumbnail import proxy_of, thumbnail
 from . import files, inspection, journal, photo, sheet, storage, verification
 from .jobs import ASIDE, Job, Want
@@ -41,8 +43,8 @@ class Task:
         CIEDE2000 from which a result needs a person, of the prediction for 90 % of its pixels; None: never.
     allow_warnings
         Whether results with warnings need none.
-    sheets
-        Whether to make contact sheets.
+    sheets, verify
+        Whether to make contact sheets, and to read back what was written.
     threads
         That one photo may use; None for one per core.
     """
@@ -53,6 +55,7 @@ class Task:
     max_error: float | None = None
     allow_warnings: bool = False
     sheets: bool = True
+    verify: bool = True
     threads: int | None = None
 
 
@@ -155,10 +158,8 @@ def _recolored(
     job = task.job
     started = time.perf_counter()
     opened = files.read(places[job.photo], job.color_space)
-    recipe = job.recipe
-    if recipe.camera in places:
-        recipe = replace(recipe, camera=str(places[recipe.camera]))
-    recipe = replace(recipe, colorways=tuple(want.colorway for want in job.wants))
+    fetched: dict[str, Any] = {name: str(places[path]) for name, path in measured(job.recipe).items()}
+    recipe = replace(job.recipe, **fetched, colorways=tuple(want.colorway for want in job.wants))
     prepared = photo.look(opened, recipe, read_mask=lambda name: _mask(places[name], digests[name], opened))
     proxy = proxy_of(prepared, _WIDEST) if sheet_due else None
     cells = []
@@ -167,19 +168,16 @@ def _recolored(
         unlit = replace(prepared, target_white=prepared.white)
         cells.append(("photo", thumbnail(proxy, unlit.for_colorway(same))))
     entries = []
-    out: NDArray | None = None
+    shared = _Shared(opened, prepared, task.verify) if due else None
     for want in job.wants:
         own = prepared.for_colorway(want.colorway)
         if proxy is not None:
             cells.append((want.colorway.name, thumbnail(proxy, own)))
-        if want not in due:
+        if shared is None or want not in due:
             entries.append(task.known[want.output] | {"status": "kept"})
             continue
-        dtype = files.output_dtype(want.output, opened)
-        if out is None or out.dtype != dtype:
-            out = np.empty(opened.pixels.shape, dtype)
         try:
-            entry = _written(task, want, opened, own, out)
+            entry = _written(task, want, shared, own)
         except DyehouseError as error:
             entry = _entry(job, want, "failed") | {"reason": str(error)}
         entries.append(entry | {"seconds": round(time.perf_counter() - started, 3)})
@@ -202,13 +200,31 @@ def _mask(place: Path, digest: str, opened: files.Photo) -> NDArray:
     return _masks[key]
 
 
-def _written(task: Task, want: Want, opened: files.Photo, own: Prepared, out: NDArray) -> Entry:
-    """Write one result and tell of it."""
+class _Shared:
+    """What the results of one photo share: its colors, where it is verified, and room for the pixels of one result."""
+
+    def __init__(self, opened: files.Photo, prepared: Prepared, verify: bool) -> None:
+        self.opened, self.palette = opened, photo.palette(prepared)
+        self.areas = verification.matte_areas(opened, prepared) if verify else None
+        self._room: NDArray = np.empty(0, np.void)
+
+    def room(self, output: str) -> NDArray:
+        """Array for the pixels of a file of this name, which those of the last one may be in."""
+        dtype = files.output_dtype(output, self.opened)
+        if self._room.dtype != dtype:
+            self._room = np.empty(self.opened.pixels.shape, dtype)
+        return self._room
+
+
+def _written(task: Task, want: Want, shared: _Shared, own: Prepared) -> Entry:
+    """Write one result and tell of it, and of what it shows in the matte areas."""
+    opened, areas = shared.opened, shared.areas
+    opened.wanted = space_named(want.output_space) if want.output_space else None
     error = predicted_error(own)
     reason = _gate(task, own, error)
     file = f"{ASIDE}/{want.output}" if reason else want.output
     place = _place(task.out, file)
-    expected = verification.expect(opened, own)
+    expected = None if areas is None else verification.expect(opened, own, areas=areas)
     with storage.arriving(place) as local:
         written, shares = photo.save(
             opened,
@@ -217,11 +233,12 @@ def _written(task: Task, want: Want, opened: files.Photo, own: Prepared, out: ND
             force=True,
             quality=want.quality,
             compression=want.compression,
-            out=out,
+            out=shared.room(want.output),
             threads=task.threads,
+            palette=shared.palette,
         )
         digest = storage.digest(written)
-        delivered = [check.as_dict() for check in expected.check(written)]
+        delivered = [] if expected is None else [check.as_dict() for check in expected.check(written)]
     _remove_other(task, want, file)
     entry = _entry(task.job, want, "needs a person" if reason else "done")
     return entry | {
@@ -240,12 +257,9 @@ def _written(task: Task, want: Want, opened: files.Photo, own: Prepared, out: ND
 def predicted_error(own: Prepared) -> dict[str, float]:
     """CIEDE2000 that half, and 90 %, of the pixels of the worst region are expected to stay below."""
     worst = {"median": 0.0, "bound90": 0.0}
-    for k, analysis in enumerate(own.analyses):
-        if own.recipe.regions[k].target is None and np.array_equal(own.white, own.target_white):
-            continue
-        found = analysis.predicted(own.target(k), own.target_white)
-        figures = {"median": found.median, "bound90": found.bound90}
-        worst = max(worst, figures, key=lambda f: f["bound90"])
+    for found in own.predictions:
+        if found is not None:
+            worst = max(worst, {"median": found.median, "bound90": found.bound90}, key=lambda f: f["bound90"])
     return {name: round(value, 4) for name, value in worst.items()}
 
 

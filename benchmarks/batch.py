@@ -24,16 +24,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from multiprocessing import forkserver
 from pathlib import Path
 
 import numpy as np
 
-from ..batch import engine, files, work
+from ..batch import engine, files, photo, sheet, storage, verification, work
 from ..batch.catalog import Run, Settings
 from ..batch.jobs import Job, gather
 from ..core import transfer
 from ..core.colorspace import SRGB
+from ..core.thumbnail import proxy_of, thumbnail
 from .speed import test_picture
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "catalog_speed.md"
@@ -45,12 +47,12 @@ CLICK = (700, 560)
 def photos(folder: Path, count: int, size: tuple[int, int] = SIZE) -> None:
     """Write JPEGs, no two alike, and the mask that fits them all."""
     folder.mkdir()
-    codes = transfer.encode(test_picture(*size), SRGB.curve, np.uint8)
+    linear = test_picture(*size)
     rng = np.random.default_rng(2)
     for k in range(count):
-        dimmed = np.roll(codes, 2 * (k % 5), axis=1).astype(np.float32) * (1 - 0.001 * k % 0.2)
-        noisy = dimmed + rng.normal(0, 0.7, codes.shape).astype(np.float32)
-        picture = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
+        exposed = np.roll(linear, 2 * (k % 5), axis=1) * np.float32(1 - 0.001 * k % 0.2)
+        codes = transfer.encode(exposed, SRGB.curve, np.uint8)
+        picture = (codes + rng.integers(-1, 2, codes.shape)).clip(0, 255).astype(np.uint8)
         files.write(folder / f"photo{k:04}.jpg", picture, files.Photo(Path(), picture, SRGB))
     y, x = np.mgrid[0 : size[0], 0 : size[1]]
     inside = ((x / size[1] - 0.5) / 0.36) ** 2 + ((y / size[0] - 0.5) / 0.4) ** 2 < 1
@@ -89,11 +91,17 @@ def seconds_of(do: Callable[[], object]) -> np.ndarray:
 
 
 def run_batch(
-    jobs: list[Job], workers: int, *, sheets: bool = True, watch: Callable[[int], None] | None = None
+    jobs: list[Job],
+    workers: int,
+    *,
+    sheets: bool = True,
+    verify: bool = True,
+    watch: Callable[[int], None] | None = None,
 ) -> None:
     """Do jobs into a folder that goes afterwards."""
     with tempfile.TemporaryDirectory() as out:
-        for number, entry in enumerate(Run(jobs, Settings(out, workers=workers, sheets=sheets)).entries()):
+        settings = Settings(out, workers=workers, sheets=sheets, verify=verify)
+        for number, entry in enumerate(Run(jobs, settings).entries()):
             if entry["status"] != "done":
                 raise SystemExit(f"{entry['output']}: {entry.get('reason')}")
             if watch:
@@ -123,13 +131,13 @@ def _refuse(task: object, reason: str) -> None:
 def run_shell(jobs: list[Job]) -> None:
     """One `dyehouse recolor` for every result, two at a time, as xargs does it."""
     program = [sys.executable, "-m", "dyehouse", "recolor"]
-    x, y = CLICK
     with tempfile.TemporaryDirectory() as out:
         lines = []
         for job in jobs:
             for want in job.wants:
                 target = str(want.colorway.targets[0])
-                command = [*program, job.photo, "--click", f"{x},{y}", "--target", target, "-o", f"{out}/{want.output}"]
+                mask = ["--mask", str(job.recipe.regions[0].mask)]
+                command = [*program, job.photo, *mask, "--target", target, "-o", f"{out}/{want.output}"]
                 lines.append(shlex.join(command))
         script = "\n".join(lines)
         subprocess.run(
@@ -224,18 +232,18 @@ def simulate(workers: int, batch: int, job: np.ndarray, service: float, tasks: i
 
 def report(count: int, some: int, small: int, rounds: int) -> Iterator[str]:
     """Lines of the page, as they are measured."""
-    click = f"click={CLICK[0]} {CLICK[1]}"
     with tempfile.TemporaryDirectory() as place:
         folder, tiny = Path(place) / "photos", Path(place) / "tiny"
         photos(folder, count)
-        jobs, masked = jobs_of(folder, click), jobs_of(folder, "mask=mask.png")
-        size = f"{SIZE[1]} x {SIZE[0]} pixels"
+        jobs, clicked = jobs_of(folder, "mask=mask.png"), jobs_of(folder, f"click={CLICK[0]} {CLICK[1]}")
         yield (
-            f"{count} photos of {size} (JPEG), {len(COLORWAYS)} colorways each, {rounds} round(s) of each. Other work "
-            "on the machine changes CPU seconds little, wall seconds much."
+            f"{count} photos of {SIZE[1]} x {SIZE[0]} (JPEG), {len(COLORWAYS)} colorways each, {rounds} round(s). "
+            "Every row but those that say otherwise is `dyehouse batch` with its defaults (contact sheets, "
+            "every file verified, a journal, a page) on 2 processes, and with a mask for every photo. Other work on "
+            "the machine changes CPU seconds little, wall seconds much."
         )
         yield ""
-        yield "| what | wall | CPU seconds a photo | ratio by CPU | by wall | bar |"
+        yield "| what | seconds a photo | CPU seconds | ratio by CPU | by wall | bar |"
         yield "|---|---|---|---|---|---|"
 
         def median(do: Callable[[], object], divisor: float) -> np.ndarray:
@@ -246,22 +254,29 @@ def report(count: int, some: int, small: int, rounds: int) -> Iterator[str]:
             return f"| {what} | {taken[0]:.3f} | {taken[1]:.3f} | {ratios[0]} | {ratios[1]} | {bar} |"
 
         bare = median(lambda: run_codec(jobs, 2), count)
-        yield row("decode and encode alone, 2 processes", bare)
+        yield row("decode and encode alone", bare)
         two = median(lambda: run_batch(jobs, 2), count)
         codec_ratio = "of decode and encode"
-        yield row("batch by a click, 2 processes", two, two / bare, codec_ratio, "at most 1.6")
+        yield row("batch", two, two / bare, codec_ratio, "at most 1.6")
+        for what, sheets, verify in (
+            ("without contact sheets and page", False, True),
+            ("without verification", True, False),
+            ("without both", False, False),
+        ):
+            taken = median(functools.partial(run_batch, jobs, 2, sheets=sheets, verify=verify), count)
+            yield row(what, taken, taken / bare, codec_ratio)
         one = median(lambda: run_batch(jobs, 1), count)
-        yield row("batch by a click, 1 process", one, one / two, "of 2 processes", "at least 1.8 by wall")
-        with_mask = median(lambda: run_batch(masked, 2), count)
-        yield row("batch with a mask, 2 processes", with_mask, with_mask / bare, codec_ratio)
-        without = median(lambda: run_batch(masked, 2, sheets=False), count)
-        yield row("the same without contact sheets", without, without / bare, codec_ratio)
+        yield row("batch on 1 process", one, one / two, "of 2 processes", "at least 1.8 by wall")
+        click = median(lambda: run_batch(clicked, 2), count)
+        yield row("batch by one click, without masks", click, click / bare, codec_ratio)
         shell = seconds_of(lambda: run_shell(jobs[:some])) / some
         loop = f"`xargs -P 2` of `dyehouse recolor` ({some} photos)"
         yield row(loop, shell, shell / two, "of batch", "at least 5")
         rival = seconds_of(lambda: run_color_matcher(folder, some)) / some
         what = f"color-matcher's command line, mkl, one result a photo ({some} photos)"
         yield row(what, rival, rival / (two / len(COLORWAYS)), "of batch, by the result")
+        yield ""
+        yield from _stages(jobs[: some + 1])
         yield ""
         job = np.array(_photo_seconds(jobs[: some + 1]))
         yield from _simulation(job, scheduler_seconds())
@@ -272,6 +287,75 @@ def report(count: int, some: int, small: int, rounds: int) -> Iterator[str]:
             f"Memory of all processes over {small} jobs on 2 processes: {end:.0f} MB at the end, {slope:+.2f} MB for "
             "every thousand jobs (least squares, after the first quarter)."
         )
+
+
+def _stages(jobs: list[Job]) -> Iterator[str]:
+    """Table of what a photo's time goes into, in one process with one thread."""
+    with tempfile.TemporaryDirectory() as out:
+        found = [stages(job, Path(out)) for job in jobs][1:]  # the first one imports and fills caches
+    taken = {name: 1000 * float(np.median([one[name] for one in found])) for name in found[0]}
+    total, codec_part = sum(taken.values()), taken["decode the photo"] + taken["encode"]
+    yield f"| stage, {len(found)} photos | CPU milliseconds a photo (median) | share |"
+    yield "|---|---|---|"
+    for name, spent in (*taken.items(), ("all", total)):
+        yield f"| {name} | {spent:.1f} | {spent / total:.0%} |"
+    each = 1e6 * taken["recolor"] / (SIZE[0] * SIZE[1] * len(COLORWAYS))
+    yield ""
+    yield (
+        f"For 1.6 times the {codec_part:.0f} ms of decoding and encoding, all else would have to take "
+        f"{0.6 * codec_part:.0f} ms; it takes {total - codec_part:.0f} ms. Recoloring alone takes "
+        f"{taken['recolor']:.0f} ms, {each:.1f} nanoseconds for a pixel and a colorway."
+    )
+
+
+def stages(job: Job, out: Path) -> dict[str, float]:
+    """CPU seconds of one thread for each part of the work on a photo with a mask, done as `work.perform` does it."""
+    taken: dict[str, float] = {}
+
+    @contextlib.contextmanager
+    def timed(name: str) -> Iterator[None]:
+        started = time.thread_time()
+        yield
+        taken[name] = taken.get(name, 0.0) + time.thread_time() - started
+
+    with timed("decode the photo"):
+        opened = files.read(job.photo)
+    recipe = replace(job.recipe, colorways=tuple(want.colorway for want in job.wants))
+    mask = files.read_mask(str(recipe.regions[0].mask), opened.pixels.shape)  # that of all photos
+    with timed("look: white, reference, model"):
+        prepared = photo.look(opened, recipe, read_mask=lambda name: mask)
+    (analysis,) = prepared.analyses
+    with timed("outline"):
+        assert analysis.mask is not None
+    with timed("correction maps"):
+        assert analysis.extra is None or analysis.extra.any()
+    with timed("contact sheet"):
+        proxy = proxy_of(prepared, 360)
+    with timed("recolor"):
+        palette = photo.palette(prepared)
+    with timed("verify"):
+        areas = verification.matte_areas(opened, prepared)
+    cells, room = [], np.empty_like(opened.pixels)
+    for want in job.wants:
+        own, path = prepared.for_colorway(want.colorway), out / want.output
+        with timed("contact sheet"):
+            cells.append((want.colorway.name, thumbnail(proxy, own)))
+        with timed("predict the error"):
+            assert own.predictions
+        with timed("recolor"):
+            pixels, _ = photo.recolored(opened, own, path, out=room, threads=1, palette=palette)
+        with timed("encode"):
+            files.write(path, pixels, opened, force=True)
+        with timed("hashes"):
+            storage.digest(path)
+        with timed("verify"):
+            verification.expect(opened, own, areas=areas).check(path)
+    with timed("contact sheet"):
+        picture = sheet.contact_sheet([cells], cells[0][1].shape[1])
+        files.write(out / "sheet.jpg", picture, files.Photo(Path(), picture, SRGB), force=True)
+    with timed("hashes"):
+        storage.digest(Path(job.photo))
+    return taken
 
 
 def _photo_seconds(jobs: list[Job]) -> list[float]:
@@ -311,11 +395,8 @@ def main() -> None:
     options.add_argument("--small", type=int, default=2000, help="photos for the memory")
     options.add_argument("--rounds", type=int, default=1)
     chosen = options.parse_args()
-    head = [
-        "# Speed and memory of catalogs",
-        "",
-        f"Made by `uv run --group bench python -m dyehouse.benchmarks.batch` on {os.process_cpu_count()} cores.",
-    ]
+    command = " ".join(["uv run --group bench python -m dyehouse.benchmarks.batch", *sys.argv[1:]])
+    head = ["# Speed and memory of catalogs", "", f"Made by `{command}` on {os.process_cpu_count()} cores.", ""]
     text = io.StringIO()
     for line in itertools.chain(head, report(chosen.photos, chosen.some, chosen.small, chosen.rounds)):
         print(line, flush=True)

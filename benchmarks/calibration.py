@@ -596,7 +596,8 @@ def main() -> None:
             other half is held out, but it is of the same scenes. The 90 % bound of a pixel is
             {confidence.PIXEL_BOUND:.1f} times its predicted error, that of a region {confidence.REGION_BOUND:.1f} times
             its 90th percentile. Flagged is what is predicted to have a median over {confidence.FLAG:g}, or hangs on
-            the choice of the model for metal or two lights."""
+            the choice of the model for metal or two lights, or departs from the plain model in a way that noise
+            hides."""
         ),
         *_predictions(found),
         "",
@@ -606,9 +607,9 @@ def main() -> None:
         *_scene_table(found),
         "",
         *paragraph(
-            """What cannot be seen: light through a thin wall looks like a more saturated body unless the product is
-            yellow or pale; a contrast curve that nobody undid looks like another shading; and noise hides both silk
-            and a second light, so that under much noise the prediction is too low there."""
+            """What is seen too little: light through a thin wall looks like a more saturated body, which is told in
+            words and not in the figure; a contrast curve that nobody undid looks like another shading; and what
+            JPEG did to a texture is not noise, so that the prediction is too low there."""
         ),
         "## A click with gloss in it",
         "",

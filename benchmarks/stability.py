@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import analyze, colorimetry, transfer
+from ..core import Analysis, analyze, colorimetry, transfer
 from ..core.colorspace import LINEAR_SRGB
 from ..core.errors import DyehouseError, ReferenceColorError
 from ..core.neighborhood import erode
@@ -40,6 +40,11 @@ SOURCES = ("red", "blue")
 TARGETS: Mapping[str, RGB] = COLORS
 """Colors of most curves: from each of the one to each other of these."""
 
+READ_THERE = "read at the reference pixel of a real sample, with its gloss"
+SWATCH = "flat swatch, in the light of the true reference"
+SWATCH_ANYWHERE = "flat swatch, in whatever light the reference has"
+"""What a target may be."""
+
 type Pixel = tuple[int, int]
 
 
@@ -53,7 +58,7 @@ class Trial:
     picture
         The photo as the program gets it.
     white, pixel, target, mask
-        What the user says: white of the light, reference pixel, target color there, coverage.
+        What the user says: white of the light, reference pixel (None: the program finds one), target color, coverage.
     clean, truth
         (H, W, 3) linear RGB without fault, in the source's and in the target's color.
     true_white, true_pixel
@@ -62,11 +67,13 @@ class Trial:
         (H, W) bool: pixels that count.
     exposure
         Of the picture, against `clean`.
+    means
+        What the target is: READ_THERE, SWATCH or SWATCH_ANYWHERE.
     """
 
     picture: Picture
     white: NDArray[np.float64]
-    pixel: Pixel
+    pixel: Pixel | None
     target: NDArray[np.float64]
     mask: NDArray
     clean: NDArray[np.float32]
@@ -75,6 +82,16 @@ class Trial:
     true_pixel: Pixel
     where: NDArray[np.bool_]
     exposure: float = 1.0
+    means: str = READ_THERE
+
+    def asked(self, analysis: Analysis) -> NDArray[np.float64]:
+        """(3,) target as the program is given it, for the reference that it has."""
+        if self.means == READ_THERE:
+            return analysis.matte_target(self.target)
+        if self.means == SWATCH:
+            return self.target
+        matte = read(Picture(self.clean), self.true_pixel, self.true_white)
+        return self.target * float(analysis.reference @ matte / (matte @ matte))
 
 
 def faultless(pair: Pair) -> Trial:
@@ -95,6 +112,13 @@ def read(picture: Picture, pixel: Pixel, white: NDArray) -> NDArray[np.float64]:
         return read_window(picture, pixel).mean(axis=0, dtype=np.float64)
 
 
+def seen(trial: Trial) -> NDArray[np.float64]:
+    """(3,) color at the trial's reference, gloss and all, as the plain models take it."""
+    if trial.pixel is None:
+        return matte_reference(trial.picture, trial.white, trial.mask).color
+    return read(trial.picture, trial.pixel, trial.white)
+
+
 @dataclass(frozen=True)
 class Outcome:
     """How a trial, or several together, came out.
@@ -106,7 +130,8 @@ class Outcome:
     body_median, body_high, body_mean
         The same of body reflection alone.
     auto_median, auto_high, auto_mean
-        The same of the model that the program takes by itself.
+        The same of the model that the program takes by itself, with the gloss in the reference that it finds; where
+        it refuses, of the model that it takes when the color is given instead.
     A, B
         Median error of the coefficients of the dichromatic model; A relative to the color at the true reference. True
         are those that fit both true renders best.
@@ -145,11 +170,13 @@ def outcome(trials: Iterable[Trial]) -> Outcome:
             deeds.append(FALLS_BACK if auto.model != "dichromatic" else WARNS if auto.warnings else NOTHING)
         except DyehouseError:
             deeds.append(REFUSES)
-        v = read(trial.picture, trial.pixel, trial.white)
+            auto = None
+        v = seen(trial)
         row: list[float] = []
         for model in ("dichromatic", "body", "auto"):
-            analysis = analyze(trial.picture, trial.white, v, trial.mask, model)
-            result = analysis.recolor(trial.target)[trial.where] / trial.exposure
+            given = auto if model == "auto" else None
+            analysis = given or analyze(trial.picture, trial.white, v, trial.mask, model)
+            result = analysis.recolor(trial.asked(analysis))[trial.where] / trial.exposure
             errors = difference(result, trial.truth[trial.where], trial.true_white)
             row += [float(np.median(errors)), float(np.quantile(errors, 0.95)), float(errors.mean())]
             if model == "dichromatic":
@@ -302,7 +329,7 @@ def tone_curve(
             spoiled = []
             for t in trials:
                 truth = toned(t.truth)
-                target = read(Picture(truth), t.pixel, t.white)
+                target = read(Picture(truth), t.true_pixel, t.white)
                 spoiled.append(replace(t, picture=Picture(toned(t.clean)), truth=truth, target=target))
             line.add(exponent, spoiled)
         series.append(line)
@@ -315,12 +342,12 @@ def contamination(settings: Settings, shares: Sequence[float] = (0, 0.005, 0.01,
     for share in shares:
         glossy, read_too = [], []
         for t in _trials("mug", settings):
-            x, y = t.pixel
+            x, y = t.true_pixel
             photo = t.clean.copy()
             photo[y - 1 : y + 2, x - 1 : x + 2] += (share * t.white).astype(np.float32)
             glossy.append(replace(t, picture=Picture(photo)))
             read_too.append(replace(glossy[-1], target=t.target + share * t.white))
-        flat.add(share, glossy)
+        flat.add(share, [replace(t, means=SWATCH) for t in glossy])
         same.add(share, read_too)
     return Curve("Gloss in the reference", "share of the white", [flat, same])
 
@@ -352,31 +379,16 @@ def random_reference(settings: Settings, draws: int = 60, steps: int = 9) -> Cur
         pixel = (int(columns[k]), int(rows[k]))
         swatch, sample = [], []
         for t in trials:
-            v = read(t.picture, pixel, t.white)
-            swatch.append(replace(t, pixel=pixel, target=_as_bright(t, v)))
+            swatch.append(replace(t, pixel=pixel, means=SWATCH_ANYWHERE))
             sample.append(replace(t, pixel=pixel, target=read(Picture(t.truth), pixel, t.white)))
         outcomes.append((outcome(swatch), outcome(sample)))
     at = np.unique(np.linspace(0, draws - 1, steps).round().astype(int))
     for line, which in ((flat, 0), (same, 1)):
         ordered = sorted((o[which] for o in outcomes), key=lambda o: o.mean)
         line.points += [(100 * k / (draws - 1), ordered[k]) for k in at]
-    # Given as a color it is read at no pixel: it is put where it is to be read.
-    own = []
-    for t in trials:
-        color = matte_reference(t.picture, t.white, t.mask).color
-        photo = t.clean.copy()
-        x, y = t.pixel
-        photo[y - 1 : y + 2, x - 1 : x + 2] = color
-        own.append(replace(t, picture=Picture(photo), target=_as_bright(t, color)))
-    best = outcome(own)
+    best = outcome([replace(t, pixel=None, means=SWATCH_ANYWHERE) for t in trials])
     found.points += [(0.0, best), (100.0, best)]
     return Curve("Reference clicked at random", "% of clicks that do better", [flat, same, found])
-
-
-def _as_bright(trial: Trial, v: NDArray) -> NDArray[np.float64]:
-    """Swatch of the target color in the light that the reference has, as a user means it who knows the swatch only."""
-    matte = read(Picture(trial.clean), trial.true_pixel, trial.true_white)
-    return trial.target * float(v @ matte / (matte @ matte))
 
 
 def _from_each(
@@ -466,7 +478,7 @@ def resolution(settings: Settings, factors: Sequence[int] = (1, 2, 4, 8)) -> Cur
                 coarse = []
                 for t in trials:
                     photo, truth = shrink(t.clean, factor), shrink(t.truth, factor)
-                    pixel = (t.pixel[0] // factor, t.pixel[1] // factor)
+                    pixel = (t.true_pixel[0] // factor, t.true_pixel[1] // factor)
                     coarse.append(
                         replace(
                             t,
@@ -494,7 +506,8 @@ GROUPS: dict[str, tuple[tuple[Callable[[Settings], Curve], str], ...]] = {
         ),
         (
             bit_depth,
-            "An sRGB file of common depth costs next to nothing; linear codes of as few bits are coarse in the dark.",
+            "An sRGB file of common depth costs next to nothing; linear codes of as few bits are coarse in the dark. "
+            "Below seven bits the program reads gloss and bounce out of the steps, and the plain model does better.",
         ),
         (
             exposure,
@@ -510,17 +523,19 @@ GROUPS: dict[str, tuple[tuple[Callable[[Settings], Curve], str], ...]] = {
     "footing": (
         (
             contamination,
-            "For a target known as a flat swatch a trace of gloss in the reference shifts the whole product, and the "
-            "warning comes late; for a target read at the same place of a real sample it cancels.",
+            "For a target known as a flat swatch a trace of gloss in the reference shifts the whole product under the "
+            "plain model; the program finds the gloss and takes it away, but not quite where there is least of it. For "
+            "a target read at the same place of a real sample it cancels.",
         ),
         (
             white_error,
-            "The white matters in the highlights only, and even a badly wrong one costs little beside a glossy click.",
+            "The white matters in the highlights only. One that is wrong by more than a tenth leaves something off the "
+            "plane, which the program takes for other light than there is: the plain model does better then.",
         ),
         (
             random_reference,
-            "Most clicks are good and the worst are in the highlight, where a warning is not enough; the reference "
-            "found by the program is better than the typical click.",
+            "Most clicks are good; one in the highlight ruins the plain model and is mended when its gloss is taken "
+            "away. The reference found by the program is better than the typical click.",
         ),
     ),
     "product": (

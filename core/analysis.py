@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import confidence, dichromatic, maps, stability
 from . import recolor as recoloring
-from .compositing import Edge, refine_outline, spill_weights
+from .compositing import Edge, refine_outline, rim_left_out, spill_weights
 from .errors import ImageError, ReferenceColorError, WhiteError
 from .materials import find_materials
 from .mixture import MODELS as _MODELS
@@ -32,15 +32,22 @@ LARGEST_NOISE_GAIN = 6.0
 # Share of a region that no model explains from which it is said.
 _UNEXPLAINED = 0.06
 
+# Gloss of the highlights from which a product shines, lack of gloss elsewhere that makes a shining one more saturated
+# than its own folds do (shares of the light), and noise gain up to which both are sure.
+_SHINES, _SATURATED, _STRONG = 0.02, 0.03, 3.0
+
 # Gloss in a clicked reference, as a share of the white, from which it is reported.
 _GLOSSY = 0.03
 _SAMPLE = 200_000
 
-# Pixels that the predicted error is found at: for its map, and for the region.
-_MAPPED, _LOOKED_AT = 1_000_000, 4_000
+# Pixels that the predicted error is found at: for its map, and for the region; and those in one go.
+_MAPPED, _LOOKED_AT, _AT_ONCE = 1_000_000, 1_000, 10_000
 
 # Share of the picture under which a region is so small that a click has probably missed the product.
 _FEWEST_PIXELS = 0.001
+
+# Width in pixels, and more, of a rim of the product outside the mask that is worth a word.
+_RIM = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +173,7 @@ class Analysis:
         pixels = self.picture.sample(_SAMPLE // 4, self.selection)
         clipped = bool((pixels >= self.picture.clip_level).any())
         e = self.evidence
-        return maps.Region(self.picture, self.selection, e.mixture, e.noise, clipped, e.below)
+        return maps.Region(self.picture, self.selection, e.mixture, e.noise, clipped, e.below, e.shines, e.body_noise)
 
     @cached_property
     def mixture(self) -> Mixture:
@@ -241,11 +248,11 @@ class Analysis:
         doubt = self.doubt(target, target_white)
         height, width = self.picture.shape
         step = max(1, int(np.ceil(np.sqrt(height * width / _MAPPED))))
-        inside = np.ones((height, width), bool) if self.selection is None else as_weights(self.selection) > 0
+        inside = np.ones((height, width), bool) if self.selection is None else self.selection > 0
         rows, columns = np.nonzero(inside[::step, ::step])
         coarse = np.zeros(inside[::step, ::step].shape, np.float32)
-        for start in range(0, len(rows), _SAMPLE):
-            part = slice(start, start + _SAMPLE)
+        for start in range(0, len(rows), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
             coarse[rows[part], columns[part]] = doubt.errors(rows[part] * step, columns[part] * step)
         if step > 1:
             coarse = coarse.repeat(step, axis=0)[:height].repeat(step, axis=1)[:, :width]
@@ -277,6 +284,8 @@ class Analysis:
             noise,
             self.noise_gain,
             e.figures.get("split_noise", 0.0),
+            e.hidden,
+            e.other,
         )
 
     @cached_property
@@ -399,6 +408,8 @@ def analyze(
         + _region_warnings(picture, m)
         + _material_warnings(picture, w, m)
     )
+    if m is not None and not spill:
+        warnings += _rim_warnings(rim_left_out(picture, m, found.color, w))
     return Analysis(picture, w, found.color, found.pixel, m, evidence, gain, tuple(warnings), found.gloss, spill)
 
 
@@ -480,6 +491,13 @@ def _evidence_warnings(evidence: Evidence) -> list[str]:
             "The product looks like metal, or lies in light of more than one color without gloss: each channel is "
             "scaled by itself; check the result against a sample."
         ]
+    strong = stability.noise_gain(evidence.mixture.body, evidence.mixture.white) < _STRONG
+    if strong and figures.get("highlights", 0.0) > _SHINES and figures.get("least_gloss", 0.0) < -_SATURATED:
+        return [
+            "Parts of the product are more saturated than its matte color, though it shines: light that came through "
+            "it (translucent material) or a sheen of its own color (silk) comes out with errors; check the result "
+            "against a sample."
+        ]
     left = max(figures.get("negative_gloss", 0.0), figures.get("residual", 0.0))
     if chosen in ("dichromatic", "regularized") and left > _UNEXPLAINED:
         return [
@@ -501,6 +519,15 @@ def _material_warnings(picture: Picture, white: NDArray, mask: NDArray | None) -
     ]
 
 
+def _rim_warnings(width: float) -> list[str]:
+    if width < _RIM:
+        return []
+    return [
+        f"The mask leaves out a rim of the product about {width:.0f} pixels wide, which keeps its old color: grow the "
+        "mask by as much."
+    ]
+
+
 def _region_warnings(picture: Picture, mask: NDArray | None) -> list[str]:
     said = []
     if mask is not None and np.count_nonzero(mask) < _FEWEST_PIXELS * mask.size:
@@ -509,7 +536,8 @@ def _region_warnings(picture: Picture, mask: NDArray | None) -> list[str]:
             "product, click another part of it or raise the tolerance."
         )
     pixels = picture.sample(_SAMPLE // 4, mask) if mask is not None else picture.overview
-    clipped = float((pixels.max(axis=1) >= picture.clip_level).mean())
+    # Channel by channel: a maximum over three numbers at a time takes ten times as long.
+    clipped = float(np.logical_or.reduce([pixels[:, k] >= picture.clip_level for k in range(3)]).mean())
     if clipped > 0.01:
         said.append(
             f"{clipped:.1%} of the region is clipped, its color there is a guess: use a darker exposure if there is "

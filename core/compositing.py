@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .dichromatic import sine
 from .neighborhood import dilate, erode, mean_at, rings
-from .picture import Picture, as_weights, bands
+from .picture import Picture, above, as_weights, bands, bounding_box
 
 # Coverage that close to 0 or 1 counts as none or all.
 _CLEAR = 0.004
@@ -48,8 +48,12 @@ class Edge:
         return slice(int(first), int(last))
 
 
-# Pixels of an outline that are looked at in one go.
-_AT_ONCE = 200_000
+# Of a picture of so many pixels along its sides, the colors well inside and outside are looked up for every pixel; of a
+# larger one for cells.
+_CELL = 600
+
+# Pixels of an outline that are looked at in one go; pixels beside it that tell whether a mask leaves out a rim.
+_AT_ONCE, _RIM_SAMPLE = 200_000, 2_000
 
 
 def reach(shape: tuple[int, int]) -> int:
@@ -89,14 +93,15 @@ def refine_outline(
     edge
         The shares, or None where no pixel needs one.
     """
-    solid, sure, clear = _above(mask, 0.5), _above(mask, 1 - _CLEAR), ~_above(mask, _CLEAR)
     margin = reach(picture.shape)
-    inner, outer = erode(solid, margin), dilate(solid, margin)
-    del solid  # a byte for each of perhaps a hundred million pixels
+    sure, clear = above(mask, 1 - _CLEAR), ~above(mask, _CLEAR)
+    inner, outer = _around(mask, margin)
     band = outer & ~inner
     band |= ~(clear | sure)
-    rows, columns = np.nonzero(band)
-    del band
+    if spill is None:
+        band &= mask > 0  # what lies outside stays as it is
+    rows, columns = np.divmod(np.flatnonzero(band), band.shape[1])
+    del band  # a byte for each of perhaps a hundred million pixels
     original = mask
     if spill is not None:
         mask = _with_spill(mask, spill)
@@ -121,9 +126,33 @@ def refine_outline(
     return mask, edge
 
 
-def _above(mask: NDArray, level: float) -> NDArray[np.bool_]:
-    """Where a mask covers more than `level`, without its weights as floats."""
-    return mask > level * (np.iinfo(mask.dtype).max if mask.dtype.kind == "u" else 1)
+def rim_left_out(picture: Picture, mask: NDArray, reference: NDArray, white: NDArray) -> float:
+    """Mean width, in pixels, of the product's rim that a mask leaves out: told up to :func:`reach`, from a sample.
+
+    The mask is (height, width) checked coverage, the colors are (3,) linear RGB. The width is 0.3 to 0.9 for the half
+    covered pixels about a hard mask that is right.
+    """
+    margin = reach(picture.shape)
+    clear = ~above(mask, _CLEAR)
+    inner, outer = _around(mask, margin)
+    beside = np.flatnonzero(outer & clear)
+    beside = beside[:: max(1, len(beside) // _RIM_SAMPLE)]
+    if len(beside) == 0:
+        return 0.0
+    rows, columns = np.divmod(beside, mask.shape[1])
+    inner &= above(mask, 1 - _CLEAR)
+    spill = np.zeros(picture.shape, np.float32)
+    find = _Outline(picture, (inner, ~outer & clear, clear), margin, reference, white, True, spill)
+    return margin * float(find.shares(rows, columns, np.zeros(len(rows)))[1].mean())
+
+
+def _around(mask: NDArray, margin: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Where everything up to `margin` away is covered by more than half; where anything is."""
+    inner, outer = np.zeros(mask.shape, bool), np.zeros(mask.shape, bool)
+    box = tuple(slice(max(0, side.start - margin), side.stop + margin) for side in bounding_box(mask))
+    solid = above(mask[box], 0.5)
+    inner[box], outer[box] = erode(solid, margin), dilate(solid, margin)
+    return inner, outer
 
 
 class _Outline:
@@ -152,6 +181,7 @@ class _Outline:
         self.picture, self.reference, self.white, self.spill = picture, reference, white, spill
         self.inside, self.well_outside, self.outside = grounds
         # The product well inside and the ground well outside, whatever the mask is wrong by; and the ground next to it.
+        self.cell = int(np.clip(np.sqrt(picture.shape[0] * picture.shape[1]) / _CELL, 1, margin // 2))
         self.far = rings((margin + 1, margin + 2, 2 * margin), (3 * margin, 4 * margin), (8 * margin,))
         self.near = rings((1, 2), (3, 4), (6,))
         self.split = _Shares(reference / white, splits)
@@ -159,17 +189,13 @@ class _Outline:
     def shares(self, rows: NDArray, columns: NDArray, asked: NDArray) -> tuple[NDArray, NDArray]:
         """(n, 3) share of the product in the light of n pixels of coverage `asked`; (n,) coverage taken in by spill."""
         white = self.white
-        product, known = mean_at(self.picture, self.inside, rows, columns, self.far)
+        product, known, ground, seen = self._far(rows, columns)
         product[~known] = self.reference
         pixels = self.picture.at(rows, columns)
+        near, next_to = mean_at(self.picture, self.outside, rows, columns, self.near)
         by_far, by_near = (
-            self.split.of(
-                asked,
-                pixels / white,
-                product / white,
-                *_seen(mean_at(self.picture, clear, rows, columns, where), white),
-            )
-            for clear, where in ((self.well_outside, self.far), (self.outside, self.near))
+            self.split.of(asked, pixels / white, product / white, there / white, there_is)
+            for there, there_is in ((ground, seen), (near, next_to))
         )
         share, product_light, fits = by_far
         # Where the far ground does not explain the pixel the near one may; where none does, the mask has the word.
@@ -182,14 +208,24 @@ class _Outline:
         # No more light than the pixel has, and none below zero beyond what the pixel itself shows.
         return np.clip(share, np.minimum(pixels, 0), np.maximum(pixels, 0)), taken
 
+    def _far(self, rows: NDArray, columns: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Mean color of the product well inside, and of the ground well outside; each with whether there is any.
+
+        They change slowly: those of one point stand for all pixels of its cell.
+        """
+        height, width = self.picture.shape
+        across = -(-width // self.cell)
+        cells, place = np.unique(rows // self.cell * across + columns // self.cell, return_inverse=True)
+        y, x = (k * self.cell + self.cell // 2 for k in np.divmod(cells, across))
+        at = np.minimum(y, height - 1), np.minimum(x, width - 1)
+        found = (mean_at(self.picture, wanted, *at, self.far) for wanted in (self.inside, self.well_outside))
+        (product, known), (ground, seen) = found
+        return product[place], known[place], ground[place], seen[place]
+
 
 def _coverage(weights: NDArray, dtype: np.dtype) -> NDArray:
     """Weights in 0..1 as the values of a mask; none that is more than 0 becomes 0."""
     return np.ceil(weights * np.iinfo(dtype).max).astype(dtype) if dtype.kind == "u" else weights.astype(dtype)
-
-
-def _seen(found: tuple[NDArray, NDArray[np.bool_]], white: NDArray) -> tuple[NDArray, NDArray[np.bool_]]:
-    return found[0] / white, found[1]
 
 
 class _Shares:

@@ -11,7 +11,8 @@ residual    what the model does not explain of the pixel: as much may have gone 
 body        1 % more or less body reflection
 hue         1 % of the light in a direction that is neither body nor white
 grain       gloss that changes from pixel to pixel: fibers of another color look the same
-lights      the difference from the plain model, where that of two lights has taken over
+lights      the difference from the plain model, where that of two lights has taken over; or from that of two lights,
+            where it was not taken and may be right
 gray        gloss that is lost in the body, where noise hides it: an ordinary 2 % of the white
 ==========  ================================================================================================
 
@@ -37,19 +38,19 @@ from .stability import Noise
 
 # Fitted: `uv run --group bench python -m dyehouse.benchmarks.calibration --fit`.
 WEIGHTS: Mapping[str, float] = {
-    "noise": 1.0,
-    "reference": 0.7,
-    "residual": 0.42,
-    "body": 0.7,
-    "hue": 0.15,
-    "grain": 0.22,
-    "lights": 0.2,
+    "noise": 0.78,
+    "reference": 0.75,
+    "residual": 0.33,
+    "body": 0.67,
+    "hue": 0.13,
+    "grain": 0.15,
+    "lights": 0.65,
     "gray": 0.14,
 }
 
 # 90 % of pixels are below this times their own predicted error; and below this times the 90th percentile of their
 # region's.
-PIXEL_BOUND, REGION_BOUND = 3.2, 2.4
+PIXEL_BOUND, REGION_BOUND = 3.0, 2.2
 
 # Predicted median from which a recolor is flagged; and median difference from the plain model from which one is that
 # takes the product for metal or sees two lights.
@@ -126,6 +127,10 @@ class Doubt:
         Of the split into body and gloss.
     split_noise
         Noise of the gloss, relative to the light.
+    hidden
+        Whether noise hides what the model does not explain, see `selection.Evidence`.
+    other
+        A model that was not taken and may be right, or None.
     """
 
     picture: Picture
@@ -137,6 +142,8 @@ class Doubt:
     noise: Noise
     noise_gain: float
     split_noise: float = 0.0
+    hidden: bool = False
+    other: Mixture | None = None
 
     @cached_property
     def _axes(self) -> tuple[NDArray, NDArray, NDArray]:
@@ -162,14 +169,6 @@ class Doubt:
         result = given @ self.matrix.T
         seen = self._lab(result)
 
-        def through(change: NDArray) -> NDArray[np.float64]:
-            """What a change of the white-balanced pixel does to the color."""
-            return delta_e_2000(self._lab(result + (change * white) @ matrix.T), seen)
-
-        def beyond(change: NDArray) -> NDArray[np.float64]:
-            """The same, if the change shall stay what it is."""
-            return delta_e_2000(self._lab(result + (change * white) @ (matrix - np.eye(3)).T), seen)
-
         body, toward, normal = self._axes
         light = (pixels / white) @ body
         color = self.mixture.body / white
@@ -177,12 +176,18 @@ class Doubt:
         wrong = np.hypot(self.noise.at(color @ body), self._step(self.mixture.body[None])[0] / white)
         strength = (light / (color @ body))[:, None]
         left = np.linalg.norm((given @ self.mixture.left_over.T) / white, axis=1, keepdims=True)
+        axes = np.eye(3)[:, None]
+        # What changes of the white-balanced pixel do to the color; and what those do that shall stay what they are.
+        through = np.concatenate([sigma * axes, strength * wrong * axes, (_SMALL * pixels / white)[None]])
+        beyond = np.stack([left * toward, _SMALL * light[:, None] * normal])
+        moved = np.concatenate([(through * white) @ matrix.T, (beyond * white) @ (matrix - np.eye(3)).T])
+        differences = delta_e_2000(self._lab(result + moved), seen)
         found = {
-            "noise": np.sqrt(np.sum([through(sigma * axis) ** 2 for axis in np.eye(3)], axis=0)),
-            "reference": np.sqrt(np.sum([through(strength * wrong * axis) ** 2 for axis in np.eye(3)], axis=0)),
-            "residual": beyond(left * toward),
-            "body": through(_SMALL * pixels / white),
-            "hue": beyond(_SMALL * light[:, None] * normal),
+            "noise": np.linalg.norm(differences[:3], axis=0),
+            "reference": np.linalg.norm(differences[3:6], axis=0),
+            "residual": differences[7],
+            "body": differences[6],
+            "hue": differences[8],
         }
         lost = _USUAL_GLOSS * (self.target_white - matrix @ white)
         hidden = min(1.0, self.split_noise) if self._colored else 1.0
@@ -190,16 +195,19 @@ class Doubt:
         found |= {"grain": np.zeros(len(rows)), "lights": np.zeros(len(rows))}
         if self._colored and self.noise_gain < _GRAY_GAIN:
             found["grain"] = delta_e_2000(self._lab(result + self._grain(rows, columns) * self.target_white), seen)
-        if self.mixture.model == "lights":
+        if self.mixture.model == "lights" or self.other is not None:
             found["lights"] = self.disagreement(rows, columns)
         return found
 
     def disagreement(self, rows: NDArray, columns: NDArray) -> NDArray[np.float64]:
-        """(n,) CIEDE2000 between the model and the plain one; 0 where the plain one is of no use."""
+        """(n,) CIEDE2000 between the model and the other, or the plain one; 0 where the plain one is of no use."""
         if not self._colored or self.noise_gain >= _GRAY_GAIN:
             return np.zeros(len(rows))
         pixels = self.picture.at(rows, columns).astype(np.float64)
-        plain = dichromatic.recolor_matrix(self.mixture.body, self.target, self.mixture.white, self.target_white)
+        if self.other is None:
+            plain = dichromatic.recolor_matrix(self.mixture.body, self.target, self.mixture.white, self.target_white)
+        else:
+            plain = self.other.matrix(self.target, self.target_white, 0.0)
         return delta_e_2000(self._lab(pixels @ plain.T), self._lab(self._given(pixels, rows, columns) @ self.matrix.T))
 
     def predict(self, rows: NDArray, columns: NDArray) -> Prediction:
@@ -222,6 +230,11 @@ class Doubt:
             said.append(
                 f"The result depends on whether the product is really {what}: compare the model 'dichromatic', or "
                 "check a sample."
+            )
+        elif self.hidden:
+            said.append(
+                "Noise hides why the product departs from body color and gloss, by light of more than one color or as "
+                "metal does: use a longer exposure, or check a sample."
             )
         return Prediction(median, bound, bool(said), tuple(said))
 

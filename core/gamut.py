@@ -53,7 +53,8 @@ def fit_to_gamut(linear: NDArray[np.float32]) -> int:
     channels = np.flatnonzero(outlying) // 3
     outside = channels[np.diff(channels, prepend=-1) > 0]
     pixels = linear[outside]
-    grey = np.clip(pixels @ _LUMINANCE, 0.0, 1.0)[:, None]
+    # Not as a product, which may round a pixel otherwise among other pixels.
+    grey = np.clip(sum(pixels[:, k] * _LUMINANCE[k] for k in range(3)), 0.0, 1.0)[:, None]
     away = pixels - grey
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         room = np.where(away > 0, (1 - grey) / away, np.where(away < 0, -grey / away, np.inf))
@@ -80,8 +81,9 @@ class Compromise:
     difference: NDArray[np.float64]
 
 
-# Lightnesses that are tried, and halvings of each search.
+# Lightnesses that are tried at once, how often between the best one's neighbors, and halvings of the search for chroma.
 _LIGHTNESSES = 33
+_PASSES = 6
 _HALVINGS = 24
 
 
@@ -117,7 +119,7 @@ def nearest(linear: ArrayLike, space: RGBSpace = SRGB, method: Method = "lab") -
 
 
 def _nearest(pixels: NDArray, space: RGBSpace, method: Method) -> NDArray[np.float64]:
-    """(n, 3) nearest colors to those outside: first along a grid of lightnesses, then between its neighbors."""
+    """(n, 3) nearest colors to those outside: along a grid of lightnesses, then along a finer one around the best."""
     to_d65 = colorimetry.adaptation_matrix(space.white, SRGB.white)
     if method == "lab":
         given, top = colorimetry.lab_to_lch(colorimetry.linear_to_lab(pixels, space)), 100.0
@@ -146,15 +148,13 @@ def _nearest(pixels: NDArray, space: RGBSpace, method: Method) -> NDArray[np.flo
     def distance(L: NDArray) -> NDArray:
         return colorimetry.delta_e_2000(wanted, colorimetry.linear_to_lab(linear(L, chroma(L)), space))
 
-    grid = np.linspace(0, top, _LIGHTNESSES)[:, None] + np.zeros_like(C0)
-    best = grid[np.argmin(distance(grid), axis=0), np.arange(len(C0))]
-    low, high = np.clip(best - top / (_LIGHTNESSES - 1), 0, top), np.clip(best + top / (_LIGHTNESSES - 1), 0, top)
-    for _ in range(_HALVINGS):  # thirds: the distance has one valley there
-        third = (high - low) / 3
-        left = distance(low + third) < distance(high - third)
-        low, high = np.where(left, low, low + third), np.where(left, high - third, high)
-    lightness = (low + high) / 2
-    return np.clip(linear(lightness, chroma(lightness)), 0, 1)
+    low, high = np.zeros_like(C0), np.full_like(C0, top)
+    for _ in range(_PASSES):
+        grid = np.linspace(low, high, _LIGHTNESSES)
+        best = grid[np.argmin(distance(grid), axis=0), np.arange(len(C0))]
+        step = (high - low) / (_LIGHTNESSES - 1)
+        low, high = np.maximum(best - step, low), np.minimum(best + step, high)
+    return np.clip(linear(best, chroma(best)), 0, 1)
 
 
 def marked(linear: NDArray[np.float32], color: ArrayLike = (1.0, 0.0, 1.0)) -> tuple[NDArray[np.float32], float]:

@@ -31,8 +31,6 @@ USUAL = 0.55
 # K rho is held below this: beyond, the sum of all bounces is a guess.
 _MOST = 0.9
 
-# Pixels that count as independent of each other: what the model misses, it misses in all of a fold.
-_INDEPENDENT = 1000
 
 _CANDIDATES = USUAL * 2.0 ** np.linspace(-2.5, 2.5, 21)
 
@@ -55,7 +53,7 @@ def bounced(body: ArrayLike, feedback: float) -> NDArray[np.float64]:
     return rho**2 / (1 - np.minimum(feedback * rho, _MOST))
 
 
-def find_feedback(pixels: NDArray, body: NDArray, noise: NDArray) -> float:
+def find_feedback(pixels: NDArray, body: NDArray, noise: NDArray, most: float = 1000) -> float:
     """Find K of a matte product from the colors of its folds.
 
     With the right K all pixels lie in the plane of the body color and its bounce. An exposure that is unknown, so that
@@ -69,6 +67,8 @@ def find_feedback(pixels: NDArray, body: NDArray, noise: NDArray) -> float:
         (3,) relative to the white.
     noise
         (n,) standard deviation of the pixels.
+    most
+        Number of pixels that count as independent of each other: what the model misses, it misses in all of a fold.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def find_feedback(pixels: NDArray, body: NDArray, noise: NDArray) -> float:
         if length < 1e-9:
             return USUAL
         # Errors beyond three deviations are something else than folds.
-        left = _INDEPENDENT * np.minimum((pixels @ (normal / length) / noise) ** 2, 9.0).mean()
+        left = most * np.minimum((pixels @ (normal / length) / noise) ** 2, 9.0).mean()
         cost = float(left + np.log2(k / USUAL) ** 2)
         if cost < least:
             best, least = float(k), cost

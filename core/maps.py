@@ -34,7 +34,7 @@ _HUGE = 1e6
 
 # Pixels of one strip, and pixels of an 8-bit picture beyond which its maps are kept in half precision: 2 ** -12 of a
 # value, less than half a step of the codes.
-_STRIP, _LARGE = 200_000, 16_000_000
+_STRIP, _LARGE = 50_000, 16_000_000
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,10 @@ class Region:
         Whether the product has clipped pixels to restore.
     below
         How far gloss may go below zero, as a share of the light.
+    shines
+        Whether highlights have the color of the light; if not, they have the product's.
+    body_noise
+        Noise of the body color itself, relative to its length.
     """
 
     picture: Picture
@@ -63,6 +67,8 @@ class Region:
     noise: Noise
     clipped: bool
     below: float = NO_GLOSS
+    shines: bool = True
+    body_noise: float = 0.0
 
     @property
     def mapped(self) -> bool:
@@ -75,15 +81,17 @@ class Region:
         whole = np.ones(linear.shape[:2], bool)
         if self.selection is not None:
             whole = as_weights(self.selection[rows, columns]) > _WHOLE
-        over = (linear >= self.picture.clip_level).any(axis=2)
+        over = np.logical_or.reduce([linear[..., k] >= self.picture.clip_level for k in range(3)])
         balanced: NDArray[np.float32] = np.divide(linear, self.mixture.white, dtype=np.float32)
         return np.clip(balanced, -_HUGE, _HUGE, out=balanced), whole, over & whole
 
 
 def with_corrections(mixture: Mixture, clipped: bool) -> Mixture:
     """The same model, with columns for the corrections that restore clipped pixels."""
-    if not clipped or mixture.model == "metal":
+    if not clipped:
         return mixture
+    if mixture.model == "metal":
+        return replace(mixture, projector=np.hstack([mixture.projector, np.eye(3)]))
     terms = mixture.terms if "white" in mixture.terms else (*mixture.terms, "white")
     projector = np.zeros((len(terms), mixture.projector.shape[1]))
     projector[: len(mixture.terms)] = mixture.projector
@@ -156,8 +164,13 @@ class _Grid:
     def _summed(self, part: NDArray) -> NDArray[np.float64]:
         if self.cell == 1:
             return part.astype(np.float64)
-        by_row = np.add.reduceat(part, np.arange(0, part.shape[0], self.cell), axis=0, dtype=np.float64)
-        return np.add.reduceat(by_row, np.arange(0, part.shape[1], self.cell), axis=1)
+        rest = [(0, -size % self.cell) for size in part.shape[:2]]
+        whole = np.pad(part, (*rest, (0, 0))) if any(more for _, more in rest) else part
+        height, width, count = whole.shape
+        by_row = whole.reshape(height // self.cell, self.cell, -1).sum(axis=1, dtype=np.float64)
+        # As a product, for sums of a few numbers that lie apart are slow.
+        sums = by_row.reshape(-1, self.cell * count) @ np.tile(np.eye(count), (self.cell, 1))
+        return sums.reshape(height // self.cell, width // self.cell, count)
 
     def at(self, values: NDArray, rows: slice) -> NDArray[np.float32]:
         """(h, w, k) values (height, width, k) of the cells at every pixel of a strip, by linear interpolation."""
@@ -254,6 +267,7 @@ def _told_apart(
 ) -> tuple[list[NDArray], NDArray]:
     """Maps that the model has, of gloss and bounce; and A."""
     terms = region.mixture.terms
+    variance = variance + (region.body_noise * light) ** 2
     gloss, bounce, _ = split(light, across, variance, axes, "bounce" in terms, "white" in terms, region.below)
     body = (light - gloss * axes.white[0] - bounce * axes.bounce[0]) / axes.length
     return [found for found, term in ((gloss, "white"), (bounce, "bounce")) if term in terms], body
@@ -311,29 +325,44 @@ def _restore_strip(
     v = region.mixture.body / region.mixture.white
     near = np.maximum(grid.at(filled[..., -1:], rows)[over, 0].astype(np.float64), 1e-7)
     top = x * region.mixture.white >= region.picture.clip_level
-    known = (~top).astype(np.float64)
-    # Least squares over the known channels, and A near that of the neighbors.
-    level = (known * x).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    trust = np.hypot(region.noise.at(level), MODEL_ERROR * level) / _NEIGHBOR_ERROR
-    a11 = (known * v**2).sum(axis=1) + (trust / near) ** 2 + 1e-9
-    a12, a22 = (known * v).sum(axis=1), known.sum(axis=1) + 1e-9
-    r1 = (known * x * v).sum(axis=1) + trust**2 / near + 1e-9 * near
-    r2 = (known * x).sum(axis=1)
-    body = (a22 * r1 - a12 * r2) / (a11 * a22 - a12**2)
-    body = np.clip(body, 0, 6 * near)
-    gloss = (r2 - a12 * body) / a22
-    # A clipped channel was at least what was stored.
-    least = np.where(top, x - body[:, None] * v, -np.inf).max(axis=1)
-    gloss = np.maximum(gloss, least)
+    body, gloss = _unclipped(region, x, top, near)
     has = np.concatenate([pixels[over] * region.mixture.white.astype(np.float32), part[over]], axis=1)
     base = region.mixture.projector.shape[1] - 3
-    if region.mapped and "white" in region.mixture.terms:
+    if region.mixture.model == "metal":
+        part[over] = np.where(top, np.maximum(body[:, None] - x / (v + 1e-9), 0), 0)
+    elif region.mapped and "white" in region.mixture.terms:
         part[over, 0] = gloss
         has[:, 3] = gloss
         part[over, base] = body - has @ final.coefficient("body")
     else:
         part[over, base] = body - has @ final.coefficient("body")
         part[over, base + 1] = gloss - has @ final.coefficient("white")
+
+
+def _unclipped(
+    region: Region, x: NDArray, top: NDArray[np.bool_], near: NDArray
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A and B of (n, 3) balanced pixels whose channels `top` are clipped, in the body's light `near` them.
+
+    Least squares over the known channels, and A near that of the neighbors; or, where highlights have the product's
+    color, B near none.
+    """
+    v = region.mixture.body / region.mixture.white
+    known = (~top).astype(np.float64)
+    level = (known * x).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    sigma = np.hypot(region.noise.at(level), MODEL_ERROR * level)
+    trust = sigma / _NEIGHBOR_ERROR if region.shines else 1e-3 * sigma
+    matte = 0.0 if region.shines else (sigma / (NO_GLOSS * np.maximum(level, 1e-6))) ** 2
+    a11 = (known * v**2).sum(axis=1) + (trust / near) ** 2 + 1e-9
+    a12, a22 = (known * v).sum(axis=1), known.sum(axis=1) + matte + 1e-9
+    r1 = (known * x * v).sum(axis=1) + trust**2 / near + 1e-9 * near
+    r2 = (known * x).sum(axis=1)
+    body = np.clip((a22 * r1 - a12 * r2) / (a11 * a22 - a12**2), 0, 6 * near)
+    # A clipped channel was at least what was stored.
+    if not region.shines:
+        body = np.maximum(body, np.where(top, x / np.maximum(v, 1e-9), 0).max(axis=1))
+    gloss = (r2 - a12 * body) / a22
+    return body, np.maximum(gloss, np.where(top, x - body[:, None] * v, -np.inf).max(axis=1))
 
 
 def _fill(means: NDArray) -> NDArray[np.float64]:

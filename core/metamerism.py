@@ -72,10 +72,15 @@ class MetamerismIndex:
     def sentence(self) -> str:
         """The figures in words."""
         degrees = {"1931": 2, "1964": 10}[self.observer]
-        text = (
+        return (
             f"Metamerism index {self.value:.2f} (CIE 15:2018, 9.2: CIELAB, {self.reference} to {self.test}, "
-            f"{degrees}° observer); under {self.reference} the two differ by {self.reference_difference:.2f}"
+            f"{degrees}° observer); {self.match}"
         )
+
+    @property
+    def match(self) -> str:
+        """How well the two match under the reference light, in words."""
+        text = f"under {self.reference} the two differ by {self.reference_difference:.2f}"
         return text + (", which is no match." if self.reference_difference > _NO_MATCH else ", which is corrected for.")
 
 
@@ -138,6 +143,13 @@ def under_lights(
         codes = SRGB.curve.encode(np.clip(linear[0], 0, 1))
         looks.append(Look(spectra.illuminant(light).name, lab, codes, shift))
     return looks
+
+
+def special_indices(
+    standard: Swatch, sample: Swatch, reference: Light = "D65", observer: str = "1931"
+) -> list[MetamerismIndex]:
+    """:func:`special_index` for each of `LIGHTS` but the reference."""
+    return [special_index(standard, sample, test, reference, observer) for test in LIGHTS if test != reference]
 
 
 def special_index(

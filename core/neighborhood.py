@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from . import transfer
 from .picture import Picture
 
 # Points in a window along each axis; a larger window is looked at on a coarser grid.
@@ -36,47 +37,11 @@ def erode(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
     return ~dilate(~mask, radius)
 
 
-def mean_nearby(
-    picture: Picture, wanted: NDArray[np.bool_], rows: NDArray, columns: NDArray, radius: int, top: int = 0
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Mean color, around each position, of the pixels that are wanted.
-
-    Parameters
-    ----------
-    picture
-        The photo.
-    wanted
-        (h, width) which pixels count, for the picture's rows from `top` on; other rows do not count.
-    rows, columns
-        (n,) positions in the picture.
-    radius
-        Half the side of the square window. Wide windows are sampled on a grid.
-
-    Returns
-    -------
-    mean
-        (n, 3) float32 linear RGB, 0 where there is none.
-    found
-        (n,) whether any wanted pixel was there.
-    """
+def window(radius: int) -> NDArray[np.intp]:
+    """Offsets (n, 2), rows and columns, of a square window of half the side `radius`; a wide one is a coarser grid."""
     step = max(1, -(-(2 * radius + 1) // _POINTS))
     offsets = np.arange(-(radius // step) * step, radius + 1, step)
-    dy, dx = (grid.reshape(-1) for grid in np.meshgrid(offsets, offsets, indexing="ij"))
-    mean, found = np.zeros((len(rows), 3), np.float32), np.zeros(len(rows), bool)
-    chunk = max(1, 400_000 // len(dy))
-    for start in range(0, len(rows), chunk):
-        part = slice(start, start + chunk)
-        y, x = rows[part, None] + dy, columns[part, None] + dx
-        inside = (y >= top) & (y < top + wanted.shape[0]) & (x >= 0) & (x < wanted.shape[1])
-        y, x = np.clip(y, top, top + wanted.shape[0] - 1), np.clip(x, 0, wanted.shape[1] - 1)
-        counts = inside & wanted[y - top, x]
-        chosen = np.nonzero(counts)
-        light = picture.at(y[chosen], x[chosen])
-        total = counts.sum(axis=1)
-        sums = np.stack([np.bincount(chosen[0], light[:, k], minlength=len(y)) for k in range(3)], axis=1)
-        mean[part] = sums / np.maximum(total, 1)[:, None]
-        found[part] = total > 0
-    return mean, found
+    return np.stack(np.meshgrid(offsets, offsets, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def rings(*radii: tuple[float, ...]) -> list[NDArray[np.intp]]:
@@ -91,7 +56,7 @@ def rings(*radii: tuple[float, ...]) -> list[NDArray[np.intp]]:
 
 def mean_at(
     picture: Picture, wanted: NDArray[np.bool_], rows: NDArray, columns: NDArray, offsets: list[NDArray[np.intp]]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Mean color, around each position, of the pixels that are wanted.
 
     Parameters
@@ -103,29 +68,48 @@ def mean_at(
     rows, columns
         (n,) positions.
     offsets
-        Groups of (m, 2) where to look: the first group in which any pixel counts is taken.
+        Groups of (m, 2) where to look, from :func:`window` or :func:`rings`: the first group in which any pixel counts
+        is taken.
 
     Returns
     -------
     mean
-        (n, 3) linear RGB, 0 where there is none.
+        (n, 3) float32 linear RGB, 0 where there is none.
     found
         (n,) whether any wanted pixel was there.
     """
-    height, width = picture.shape
-    mean, found = np.zeros((len(rows), 3)), np.zeros(len(rows), bool)
+    mean, found = np.zeros((len(rows), 3), np.float32), np.zeros(len(rows), bool)
     for group in offsets:
         missing = np.flatnonzero(~found)
-        chunk = max(1, 400_000 // len(group))
-        for start in range(0, len(missing), chunk):
-            at = missing[start : start + chunk]
-            y, x = rows[at, None] + group[:, 0], columns[at, None] + group[:, 1]
-            inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
-            counts = inside & wanted[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)]
-            chosen = np.nonzero(counts)
-            light = picture.at(y[chosen], x[chosen])
-            total = counts.sum(axis=1)
-            sums = np.stack([np.bincount(chosen[0], light[:, k], minlength=len(at)) for k in range(3)], axis=1)
-            mean[at] = sums / np.maximum(total, 1)[:, None]
-            found[at] = total > 0
+        if len(missing) == 0:
+            break
+        sums, total = _sums(picture, wanted, rows[missing], columns[missing], group)
+        mean[missing] = sums / np.maximum(total, 1)[:, None]
+        found[missing] = total > 0
     return mean, found
+
+
+def _sums(
+    picture: Picture, wanted: NDArray[np.bool_], rows: NDArray, columns: NDArray, group: NDArray[np.intp]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(n, 3) sums of the wanted pixels at the offsets of one group, and (n,) how many they are."""
+    height, width = picture.shape
+    codes, counts = picture.pixels.reshape(height * width, -1), wanted.reshape(-1)
+    sums, total = np.zeros((len(rows), 3), np.float32), np.zeros(len(rows), np.float32)
+    reach = np.abs(group).max(axis=0)
+    near_border = (
+        min(rows.min(), height - 1 - rows.max()) < reach[0] or min(columns.min(), width - 1 - columns.max()) < reach[1]
+    )
+    at = rows * width + columns
+    for down, across in group.tolist():
+        places = at + (down * width + across)
+        if near_border:
+            y, x = rows + down, columns + across
+            inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
+            counted = counts.take(places, mode="clip") & inside
+        else:
+            counted = counts.take(places)
+        light = transfer.decode(codes.take(places, axis=0, mode="clip")[:, :3], picture.curve)
+        np.add(sums, light, out=sums, where=counted[:, None])
+        total += counted
+    return sums, total

@@ -87,9 +87,8 @@ class Picture:
             step = _step(height * width, most)
             some = part(slice(step // 2, None, step), slice(step // 2, None, step))
             return some.reshape(-1, some.shape[2])
-        scale = np.iinfo(mask.dtype).max if mask.dtype.kind == "u" else 1
         # A mask that is soft all over is taken where it is strongest.
-        inside = mask > 0.95 * min(scale, float(mask.max()))
+        inside = above(mask, 0.95 * min(1.0, float(as_weights(mask.max()))))
         step = _step(int(np.count_nonzero(inside)), most)
         grid = inside[step // 2 :: step, step // 2 :: step]
         if not grid.any():
@@ -185,12 +184,28 @@ def as_weights(mask: NDArray) -> NDArray[np.float32]:
     return mask.astype(np.float32, copy=False)
 
 
+def above(mask: NDArray, level: float) -> NDArray[np.bool_]:
+    """Where a checked mask covers more than `level`, 0..1, without its weights as floats."""
+    return mask > (int(level * np.iinfo(mask.dtype).max) if mask.dtype.kind == "u" else level)
+
+
 def bounding_box(mask: NDArray) -> tuple[slice, slice]:
     """(rows, columns) that hold everything a mask covers; empty slices if that is nothing."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows, columns = np.flatnonzero(mask.max(axis=1)), np.flatnonzero(mask.max(axis=0))
     if len(rows) == 0:
         return slice(0, 0), slice(0, 0)
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def block_means(values: NDArray, step: int) -> NDArray[np.float32]:
+    """(h, w, n) means of the step x step blocks of a (height, width, n) map; incomplete ones are left out."""
+    rows, columns, count = values.shape[0] // step, values.shape[1] // step, values.shape[2]
+    whole = values[: rows * step].astype(np.float32, copy=False).reshape(rows, step, -1)
+    by_row = whole.sum(axis=1)[:, : columns * step * count].reshape(-1, step * count)
+    # As a product, for sums of a few numbers that lie apart are slow.
+    return (by_row @ np.tile(np.eye(count, dtype=np.float32), (step, 1)) / np.float32(step * step)).reshape(
+        rows, columns, count
+    )
 
 
 def _size(shape: tuple[int, ...]) -> str:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import colorimetry, spectra
 from .analysis import Analysis, analyze
 from .colorspace import SRGB, RGBSpace
+from .confidence import Prediction
 from .dichromatic import as_white
 from .errors import MaskError, RecipeError, TargetError
 from .picture import Picture, as_mask
@@ -205,6 +206,17 @@ class Prepared:
         return replace(self, recipe=with_colorway(self.recipe, colorway))
 
     @cached_property
+    def predictions(self) -> list[Prediction | None]:
+        """What to expect of each region, for the recipe's own targets; None for one that nothing changes."""
+        same = np.array_equal(self.white, self.target_white)
+        return [
+            None
+            if same and self.recipe.regions[k].target is None
+            else analysis.predicted(self.target(k), self.target_white)
+            for k, analysis in enumerate(self.analyses)
+        ]
+
+    @cached_property
     def warnings(self) -> list[str]:
         """Sentences for the user: about the white, and all regions that the recipe's targets or colorways change."""
         said = list(self.white_warnings)
@@ -213,9 +225,8 @@ class Prepared:
             if all(target is None for target in asked) and np.array_equal(self.white, self.target_white):
                 continue
             name = f"Region '{region.name}'" if region.name else f"Region {k + 1}"
-            found = analysis.warnings
-            if region.target is not None:
-                found = analysis.predicted(self.target(k), self.target_white).warnings
+            prediction = self.predictions[k] if region.target is not None else None
+            found = analysis.warnings if prediction is None else prediction.warnings
             said += [f"{name}: {warning}" if len(self.analyses) > 1 else warning for warning in found]
         return said
 

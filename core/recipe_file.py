@@ -66,11 +66,14 @@ class Output:
         Of JPEG and WebP, 1 to 100.
     compression
         Of TIFF and EXR; None for the photo's.
+    output_space
+        Name of the RGB space whose primaries the results have; None for the photo's own.
     """
 
     pattern: str = "{photo}-{colorway}.png"
     quality: int = 95
     compression: str | None = None
+    output_space: str | None = None
 
     def named(self, photo: str, colorway: str, folder: str = "") -> str:
         """Path of one result; what cannot stand in a file name becomes a hyphen."""
@@ -92,7 +95,7 @@ class StoredRecipe:
     Attributes
     ----------
     recipe
-        What is asked for. Masks, the camera and spectra are as written: relative to `folder`; see :meth:`located`.
+        What is asked for. Masks, camera, lights and spectra are as written: relative to `folder`; see :meth:`located`.
     photo
         The photo's path as written, or None.
     color_space
@@ -115,7 +118,7 @@ class StoredRecipe:
         return None if self.photo is None else self.folder / self.photo
 
     def located(self) -> Recipe:
-        """Return the recipe with the paths of masks and camera joined to the folder."""
+        """Return the recipe with the paths of masks, camera and lights joined to the folder."""
         return _with_paths(self.recipe, lambda path: path if "://" in path else str(self.folder / path))
 
 
@@ -135,17 +138,25 @@ class RecipeFileError(RecipeError):
 
 
 def _with_paths(recipe: Recipe, moved: Callable[[str], str]) -> Recipe:
-    """Return the recipe with every path of a mask or a camera replaced."""
+    """Return the recipe with every path of a mask, a camera or a measured light replaced."""
 
     def mask(region: Region) -> Region:
         if not isinstance(region.mask, str) or region.mask in _MASK_WORDS:
             return region
         return replace(region, mask=moved(region.mask))
 
-    camera = recipe.camera
-    if camera is not None and camera.lower().endswith(".csv"):
-        camera = moved(camera)
-    return replace(recipe, regions=tuple(mask(region) for region in recipe.regions), camera=camera)
+    files: dict[str, Any] = {name: moved(path) for name, path in measured(recipe).items()}
+    return replace(recipe, regions=tuple(mask(region) for region in recipe.regions), **files)
+
+
+def measured(recipe: Recipe) -> dict[str, Any]:
+    """Attributes of a recipe that name a measurement in a file: of the camera, the white or the new light."""
+    values = {name: getattr(recipe, name) for name in ("camera", "white", "illuminant")}
+    return {name: value for name, value in values.items() if isinstance(value, str) and _is_file(value)}
+
+
+def _is_file(name: str) -> bool:
+    return name.lower().endswith(".csv") and "+" not in name  # mixtures hold names
 
 
 # --- files ----------------------------------------------------------------------------------------------------
@@ -564,23 +575,23 @@ def _pixels(value: Any) -> tuple[tuple[int, int], ...]:
     return tuple(_pixel(v) for v in value)
 
 
-def _light(value: Any, counts: tuple[int, ...], example: str) -> str | tuple[float, ...]:
+def _light(value: Any, counts: tuple[int, ...], example: str, folder: Path) -> str | tuple[float, ...]:
     if not isinstance(value, str):
         return _numbers(value, counts, f"{example}, or the name of a light")
     if value != "highlights":
-        spectra.illuminant(value)  # says in words if there is none
+        spectra.illuminant(str(folder / value) if _is_file(value) else value)  # says in words if there is none
     return value
 
 
-def _illuminant(value: Any, _: Path) -> str | tuple[float, ...]:
+def _illuminant(value: Any, folder: Path) -> str | tuple[float, ...]:
     if value == "highlights":
         raise Unfit("is 'highlights': name the new light, such as A")
-    return _light(value, (3,), "[1.0, 0.9, 0.7]")
+    return _light(value, (3,), "[1.0, 0.9, 0.7]", folder)
 
 
 def _camera(value: Any, folder: Path) -> str:
     name = str(_scalar(value, "str"))
-    spectra.camera_sensitivities(folder / name if name.lower().endswith(".csv") else name)
+    spectra.camera_sensitivities(folder / name if _is_file(name) else name)
     return name
 
 
@@ -620,7 +631,7 @@ _READERS: dict[str, Callable[[Any, Path], Any]] = {
     "click": lambda value, _: _pixel(value),
     "added": lambda value, _: _pixels(value),
     "removed": lambda value, _: _pixels(value),
-    "white": lambda value, _: _light(value, (2, 3), "[120, 90]"),
+    "white": lambda value, folder: _light(value, (2, 3), "[120, 90]", folder),
     "illuminant": _illuminant,
     "camera": _camera,
 }
@@ -639,6 +650,7 @@ _RANGES: dict[str, tuple[Callable[[Any], bool], str]] = {
         "write fade, keep, drop or a share from 0 to 1",
     ),
     "color_space": (lambda v: bool(space_named(v)), f"use one of {', '.join(SPACES)}"),
+    "output_space": (lambda v: bool(space_named(v)), f"use one of {', '.join(SPACES)}"),
     "photo": (bool, "give the photo's path, or leave the key out"),
     "pattern": (
         lambda v: bool(v) and not set("{}") & set(re.sub(_PLACES, "", v)),

@@ -2,7 +2,8 @@
 
 Under the plain models recoloring a region is a 3x3 matrix on linear light; under the others the same matrix with a
 few more columns, for correction maps that the analysis made once. The work is done in bands that fit the cache, on
-all cores, and only inside the region's bounding box.
+all cores, and only inside the region's bounding box; for the pixels of an 8-bit picture, which share few colors, it is
+looked up (see `palette`).
 """
 
 from __future__ import annotations
@@ -19,11 +20,19 @@ from numpy.typing import DTypeLike, NDArray
 from . import gamut, transfer
 from .compositing import Edge
 from .errors import ImageError
+from .palette import LEAST_PIXELS, MOST_REGIONS, Palette
 from .picture import Picture, as_weights, bands, bounding_box
 
 # Pixels in one matrix product: under the size from which OpenBLAS spreads a product over threads, which is many
 # times slower when another process uses the cores.
 _PRODUCT_PIXELS = 24_000
+
+# All products are of so many pixels times a whole number: OpenBLAS rounds the last ones of others in another way on
+# some processors.
+_TILE = 192
+
+# Pixels that are worked out one by one at a time.
+_SINGLES = 100_000
 
 # Bands that one thread does in a row.
 _STRIP_BANDS = 4
@@ -128,6 +137,9 @@ class Recoloring:
     ----------
     picture, regions, curve, dtype, out, threads, convert
         As for :func:`recolor`.
+    palette
+        From :func:`shared_palette`, for several recolors of one picture by the same regions: the same result in less
+        time.
 
     Attributes
     ----------
@@ -147,17 +159,19 @@ class Recoloring:
         out: NDArray | None = None,
         threads: int | None = None,
         convert: NDArray | None = None,
+        palette: Palette | None = None,
     ) -> None:
         self._dtype = np.dtype(dtype)
         self._height, self._width = picture.shape
         self._threads = threads or os.process_cpu_count() or 1
         self.out = np.empty((self._height, self._width, 3), self._dtype) if out is None else out
         self.shares = Shares(0, 0.0)
-        self._rows, columns = _bounds(regions, self._height, self._width)
+        self._rows, columns = palette.box if palette else _bounds(regions, self._height, self._width)
         if self._dtype != picture.pixels.dtype or (curve or transfer.LINEAR) != picture.curve or convert is not None:
             # Everything must be encoded anew.
             self._rows, columns = slice(0, self._height), slice(0, self._width)
         self._job = _Job(picture, regions, columns, curve or transfer.LINEAR, self._dtype, self.out, convert)
+        self._palette = palette
 
     def rows(self) -> Iterator[int]:
         """Do the work; yields the number of rows from the top that are done, growing to the height.
@@ -169,6 +183,8 @@ class Recoloring:
         """
         job, counts = self._job, []
         columns = job.columns
+        if self._palette is not None and self._dtype == np.uint8 and self._palette.box == (self._rows, columns):
+            job.look_up(self._palette)
         whole = (self._rows.stop - self._rows.start, columns.stop - columns.start) == (self._height, self._width)
         if not whole and not np.shares_memory(self.out, job.picture.pixels):
             np.copyto(self.out[..., :3], job.picture.pixels[..., :3])
@@ -186,9 +202,19 @@ class Recoloring:
                     yield strip[-1].stop
             finally:
                 pool.shutdown(cancel_futures=True)
-        pixels, outside = (sum(c) for c in zip(*counts, strict=True)) if counts else (0, 0)
+        pixels, outside = (sum(c) for c in zip(job.looked_up, *counts, strict=True))
         self.shares = Shares(int(pixels), float(outside / pixels) if pixels else 0.0)
         yield self._height
+
+
+def shared_palette(picture: Picture, regions: Sequence[RegionMatrix]) -> Palette | None:
+    """Colors of the part of a picture that these regions change, for several recolors; None where they are no help."""
+    box = rows, columns = _bounds(regions, *picture.shape)
+    few = (rows.stop - rows.start) * (columns.stop - columns.start) < LEAST_PIXELS
+    if few or picture.pixels.dtype != np.uint8 or len(regions) > MOST_REGIONS:
+        return None
+    palette = Palette(picture, regions, box)
+    return palette if palette.worthwhile else None
 
 
 def _bounds(regions: Sequence[RegionMatrix], height: int, width: int) -> tuple[slice, slice]:
@@ -232,9 +258,69 @@ class _Job:
         self.matrices = [np.ascontiguousarray(r.matrix[:, :3].T, np.float32) for r in regions]
         self.changes = [np.ascontiguousarray((r.matrix[:, :3] - np.eye(3)).T, np.float32) for r in regions]
         self.corrections = [np.ascontiguousarray(r.matrix[:, 3:].T, np.float32) for r in regions]
+        # What is done to a pixel must not depend on those beside it.
+        self.plain = len(regions) == 1 and regions[0].mask is None
+        self.palette: Palette | None = None
+        self.looked_up = 0, 0
+
+    def look_up(self, palette: Palette) -> None:
+        """Work out all colors of the picture, and the pixels that need more than their color."""
+        linear = transfer.decode(palette.codes, self.picture.curve)
+        result = linear.copy()
+        for k, change in enumerate(self.changes):
+            part = slice(*palette.ends[k : k + 2])
+            if self.plain:
+                _product(linear[part], self.matrices[k], result[part])
+            else:
+                result[part] += _product(linear[part], change, np.empty_like(linear[part]))
+        self.recolored, self.beyond = self._encoded(result)
+        singles = [self._singly(palette, start) for start in range(0, len(palette.rows), _SINGLES)]
+        self.singles = np.concatenate([np.empty((0, 3), np.uint8), *(codes for codes, _, _ in singles)])
+        self.looked_up = palette.inside + sum(s[1] for s in singles), sum(s[2] for s in singles)
+        self.palette = palette
+
+    def _singly(self, palette: Palette, start: int) -> tuple[NDArray[np.uint8], int, int]:
+        """Recolor some pixels one by one; returns their codes, how many are inside regions, and out of gamut."""
+        part = slice(start, start + _SINGLES)
+        y, x, here, linear = palette.rows[part], palette.columns[part], palette.places[part], palette.light[part]
+        weights = [None if r.mask is None else as_weights(r.mask[y, x]) for r in self.regions]
+        extras = [None if r.extra is None else r.extra[y, x] for r in self.regions]
+        edges = []
+        for region in self.regions:
+            at, share = _edge(region.edge, slice(int(y[0]), int(y[-1]) + 1), 0, self.picture.shape[1])
+            at += y[0] * self.picture.shape[1]
+            known = slice(*np.searchsorted(at, (here[0], here[-1] + 1)))
+            edges.append((np.searchsorted(here, at[known]), share[known]))
+        result = np.empty_like(linear)
+        inside = self._blend(linear, weights, edges, extras, result)
+        codes, beyond = self._encoded(result)
+        return codes, inside, int(np.count_nonzero(beyond))
+
+    def _encoded(self, result: NDArray[np.float32]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        """(n, 3) codes of recolored colors, which are overwritten, and which of them are out of gamut."""
+        if self.convert is not None:
+            result = _product(result, self.convert, np.empty_like(result))
+        beyond = gamut.out_of_gamut(result)
+        gamut.fit_to_gamut(result)
+        codes = np.empty((1, len(result), 3), np.uint8)
+        transfer.Encoder(self.curve, self.dtype).into(result, codes)
+        return codes[0], beyond
+
+    def _run_looked_up(self, palette: Palette, rows: slice) -> tuple[int, int]:
+        """Look a band up; returns what :meth:`run` does, without what is in `looked_up`."""
+        places = palette.at(rows)
+        target = self.out[rows, self.columns, :3]
+        found = self.recolored.view("V3")[:, 0].take(places, mode="clip")
+        target[...] = found.view(np.uint8).reshape(target.shape)
+        first, last = np.searchsorted(palette.rows, (rows.start, rows.stop))
+        self.out[palette.rows[first:last], palette.columns[first:last], :3] = self.singles[first:last]
+        return 0, int(np.count_nonzero(self.beyond.take(places, mode="clip"))) if self.beyond.any() else 0
 
     def run(self, parts: list[slice]) -> tuple[int, int]:
         """Recolor these bands; returns (pixels in regions, pixels out of gamut)."""
+        if self.palette is not None:
+            both = [self._run_looked_up(self.palette, rows) for rows in parts]
+            return sum(b[0] for b in both), sum(b[1] for b in both)
         inside = outside = 0
         if not parts:
             return 0, 0
@@ -258,7 +344,7 @@ class _Job:
             with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is told in words below
                 inside += self._apply(rows, linear, weights, result)
                 if self.convert is not None:
-                    result[...] = _product(result, self.convert, linear)
+                    result[...] = _product(result, self.convert, scratch[:n])
             if self.floats and not np.isfinite(np.vdot(result, result)):
                 _check_finite(result)
             if self.integer:
@@ -279,43 +365,51 @@ class _Job:
         result: NDArray[np.float32],
     ) -> int:
         """Recolor one band into `result`; returns the number of pixels inside regions."""
-        if len(weights) == 1 and (weights[0] is None or weights[0].min() == 1):
+        columns = self.columns
+        extras = [None if r.extra is None else _flat(r.extra[rows, columns]) for r in self.regions]
+        edges = [_edge(r.edge, rows, columns.start, columns.stop - columns.start) for r in self.regions]
+        return self._blend(linear, weights, edges, extras, result)
+
+    def _blend(
+        self,
+        linear: NDArray[np.float32],
+        weights: list[NDArray[np.float32] | None],
+        edges: list[tuple[NDArray[np.intp], NDArray[np.float32]]],
+        extras: list[NDArray | None],
+        result: NDArray[np.float32],
+    ) -> int:
+        """Recolor (n, 3) pixels by (n,) weights of the regions, places and shares of edges, and (n, k) corrections."""
+        if self.plain:
             _product(linear, self.matrices[0], result)
-            correction = self._correction(0, rows)
+            correction = self._correction(0, extras[0])
             if correction is not None:
                 result += correction
             return len(linear)
         np.copyto(result, linear)
         room = np.ones(len(linear), np.float32)
         for k in reversed(range(len(self.regions))):
-            edge, asked = self.regions[k].edge, weights[k]
+            asked = weights[k]
             if asked is None:
                 asked = np.ones(len(linear), np.float32)
             granted = np.minimum(asked, room)
             room -= granted
             change = _product(linear, self.changes[k], np.empty_like(linear))
             change *= granted[:, None]
-            if edge is not None:
-                part = edge.within(rows)
-                width = self.columns.stop - self.columns.start
-                at = (edge.rows[part] - rows.start) * width + edge.columns[part] - self.columns.start
+            at, share = edges[k]
+            if len(at):
                 scale = granted[at] / np.maximum(asked[at], 1e-6)
-                change[at] = (edge.share[part] @ self.changes[k]) * scale[:, None]
-            correction = self._correction(k, rows)
+                change[at] = _product(share, self.changes[k], np.empty_like(share)) * scale[:, None]
+            correction = self._correction(k, extras[k])
             if correction is not None:
                 change += correction * granted[:, None]
             result += change
         return int(np.count_nonzero(room < 1))
 
-    def _correction(self, k: int, rows: slice) -> NDArray[np.float32] | None:
-        """(n, 3) what the corrections of region `k` add to a band; None where they are all 0."""
-        extra = self.regions[k].extra
-        if extra is None:
+    def _correction(self, k: int, extra: NDArray | None) -> NDArray[np.float32] | None:
+        """(n, 3) what (n, k) corrections of region `k` add; None where they are all 0."""
+        if extra is None or not extra.any():
             return None
-        part = extra[rows, self.columns]
-        if not part.any():
-            return None
-        maps = part.reshape(-1, part.shape[2]).astype(np.float32, copy=False)
+        maps = extra.astype(np.float32, copy=False)
         return _product(maps, self.corrections[k], np.empty((len(maps), 3), np.float32))
 
     def _weights(self, region: RegionMatrix, rows: slice) -> NDArray[np.float32] | None:
@@ -324,11 +418,29 @@ class _Job:
         return as_weights(region.mask[rows, self.columns]).reshape(-1)
 
 
+def _edge(edge: Edge | None, rows: slice, left: int, width: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Places in a band that begins at column `left`, and (n, 3) shares, of the pixels of an edge."""
+    if edge is None:
+        return np.empty(0, np.intp), np.empty((0, 3), np.float32)
+    part = edge.within(rows)
+    return (edge.rows[part] - rows.start) * width + edge.columns[part] - left, edge.share[part]
+
+
+def _flat(extra: NDArray) -> NDArray:
+    return extra.reshape(-1, extra.shape[2])
+
+
 def _product(pixels: NDArray[np.float32], matrix: NDArray[np.float32], out: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(n, m) pixels times (m, 3), in `out`: the same for the same pixel, wherever among others it stands."""
     multiply = np.dot if len(matrix) == 1 else np.matmul  # which is three times slower for a single column
-    for start in range(0, len(pixels), _PRODUCT_PIXELS):
-        part = slice(start, start + _PRODUCT_PIXELS)
+    whole = len(pixels) // _TILE * _TILE
+    for start in range(0, whole, _PRODUCT_PIXELS):
+        part = slice(start, min(start + _PRODUCT_PIXELS, whole))
         multiply(pixels[part], matrix, out=out[part])
+    if whole < len(pixels):
+        rest = np.zeros((_TILE, pixels.shape[1]), np.float32)
+        rest[: len(pixels) - whole] = pixels[whole:]
+        out[whole:] = multiply(rest, matrix)[: len(pixels) - whole]
     return out
 
 

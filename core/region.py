@@ -9,7 +9,7 @@ another color.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .dichromatic import sine
 from .errors import MaskError
-from .neighborhood import dilate, erode, mean_nearby
-from .picture import Picture, strips
+from .neighborhood import dilate, erode, mean_at, window
+from .picture import Picture, bands, block_means, strips
 from .reference import DARK, _plane, check_pixel, read_window, trimmed_mean
 
 # Pixels of the reduced picture on which the region is grown.
@@ -201,7 +201,7 @@ def _box_mean(values: NDArray, radius: int) -> NDArray[np.float32]:
 def _hard_edge(shape: tuple[int, int], grown: NDArray[np.bool_], step: int) -> NDArray[np.uint8]:
     rows = np.minimum(np.arange(shape[0]) // step, grown.shape[0] - 1)
     columns = np.minimum(np.arange(shape[1]) // step, grown.shape[1] - 1)
-    return grown[np.ix_(rows, columns)].astype(np.uint8) * np.uint8(255)
+    return (grown * np.uint8(255)).take(columns, axis=1).take(rows, axis=0)
 
 
 def _times(t: _Tolerance, factor: float) -> _Tolerance:
@@ -214,13 +214,9 @@ def shrink(picture: Picture, step: int) -> NDArray[np.float32]:
     if step == 1:
         return picture.linear()
     rows, columns = height // step, width // step
-    out = np.zeros((rows, columns, 3), np.float32)
-    for top, bottom in strips(rows, columns * step * step):
-        block = picture.linear(slice(top * step, bottom * step), slice(0, columns * step))
-        for down in range(step):
-            for across in range(step):
-                out[top:bottom] += block[down::step, across::step]
-    out /= np.float32(step * step)
+    out = np.empty((rows, columns, 3), np.float32)
+    for part in bands(rows, columns * step * step):
+        out[part] = block_means(picture.linear(slice(part.start * step, part.stop * step)), step)
     return out
 
 
@@ -229,22 +225,25 @@ def _half_range(values: NDArray) -> float:
     return float(high - low) / 2
 
 
+def _angles(balanced: NDArray, body: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Light along the body color, and the components out of the plane and toward the white."""
+    normal, toward = _plane(body)
+    axes = np.stack([body / np.linalg.norm(body), normal, toward]).astype(np.float32)
+    along, out, paler = (axes @ balanced.reshape(-1, 3).T).reshape(3, *balanced.shape[:-1])
+    return along, out, paler
+
+
 class _Grower:
     """Growth of one region on the reduced, white-balanced picture."""
 
     def __init__(self, balanced: NDArray, white: NDArray, start: tuple[int, int], clip: float) -> None:
         self.balanced, self.white, self.start = balanced, white, start
-        self.clipped = (balanced * white).max(axis=-1) >= clip
-
-    def _angles(self, body: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Light along the body color, and the components out of the plane and toward the white."""
-        normal, toward = _plane(body)
-        unit = body / np.linalg.norm(body)
-        return self.balanced @ unit, self.balanced @ normal, self.balanced @ toward
+        self.clipped = np.logical_or.reduce([balanced[..., k] * white[k] >= clip for k in range(3)])
+        self.size = np.sqrt(np.einsum("...i,...i", balanced, balanced))
 
     def grow(self, body: NDArray, tolerance: _Tolerance) -> NDArray[np.bool_]:
         """Select what is of this body color and hangs together with the start."""
-        along, out, paler = self._angles(body)
+        along, out, paler = _angles(self.balanced, body)
         untilted, out = out, out - tolerance.tilt * paler
         safe = np.maximum(along, 1e-6)
         # The step of an 8-bit code near black turns the color of dark pixels, most where the white is low.
@@ -262,8 +261,7 @@ class _Grower:
         similar[self.start] = True
         core = _connected(similar, self.start)
         # What the material surrounds: gloss near the plane, clipped pixels, shadow too dark to have a color, folds.
-        size = np.linalg.norm(self.balanced, axis=-1)
-        glossy = (np.minimum(np.abs(out), np.abs(untilted)) <= _GLOSS_SLOPE * size + blur) & (along > 0)
+        glossy = (np.minimum(np.abs(out), np.abs(untilted)) <= _GLOSS_SLOPE * self.size + blur) & (along > 0)
         # Deep folds: light that met the material twice is darker, more colored and turned in hue.
         folded = (along < 0.7 * float(np.linalg.norm(body))) & (paler < 0) & (np.abs(out) <= _FOLD_SLOPE * safe + blur)
         sheen_slope = min(_SHEEN_SLOPE, float(np.tan(np.radians(0.7 * to_white))))
@@ -291,23 +289,16 @@ class _Grower:
         steps[:, 1:] |= across
         return steps
 
-    def _some_of(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Every n-th pixel of a selection, enough to learn from."""
-        places = np.flatnonzero(inside)
-        some = np.zeros(inside.size, bool)
-        some[places[:: max(1, len(places) // _LEARNED_PIXELS)]] = True
-        return some.reshape(inside.shape)
-
     def learn(self, inside: NDArray, body: NDArray) -> tuple[NDArray, _Tolerance]:
         """Body color and tolerance of the material, from what a strict growth found."""
-        inside = self._some_of(inside)
-        pixels = self.balanced[inside]
+        places = np.flatnonzero(inside)
+        pixels = self.balanced.reshape(-1, 3)[places[:: max(1, len(places) // _LEARNED_PIXELS)]]
         if len(pixels) < 30:
             return body, _LEAST
         light = pixels.sum(axis=1)
         lit = pixels[light >= np.quantile(light, 0.5)]
         body = np.quantile(lit / lit.sum(axis=1, keepdims=True), 0.5, axis=0) * body.sum()
-        along, out, paler = (values[inside] for values in self._angles(body))
+        along, out, paler = _angles(pixels, body)
         usable = along > 0.2 * np.quantile(along, 0.5)
         off, pale = (np.degrees(np.arctan2(c[usable], along[usable])) for c in (out, paler))
         # Where the material varies enough along the plane to show it, the plane is learned too.
@@ -342,8 +333,8 @@ def label(mask: NDArray) -> tuple[NDArray[np.int32], int]:
     padded = np.zeros((height, width + 2), np.int8)
     padded[:, 1:-1] = mask
     change = np.diff(padded, axis=1)
-    row, begin = np.nonzero(change == 1)
-    _, end = np.nonzero(change == -1)
+    row, begin = np.divmod(np.flatnonzero(change == 1), width + 1)
+    end = np.flatnonzero(change == -1) % (width + 1)
     if len(row) == 0:
         return np.zeros((height, width), np.int32), 0
     # Two runs in neighboring rows touch if each begins before the other ends: candidates by binary search.
@@ -418,23 +409,31 @@ def _surrounded(rest: NDArray, core: NDArray, balanced: NDArray, small: float, l
     """
     labels, count = label(rest)
     against, outline, jump = np.zeros(count + 1), np.zeros(count + 1), np.zeros(count + 1)
-    for axis in (0, 1):
-        low = tuple(slice(None, -1) if k == axis else slice(None) for k in (0, 1))
-        high = tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))
-        for one, other in ((low, high), (high, low)):
-            edge = (labels[one] > 0) & (labels[other] != labels[one])
-            touching = edge & core[other]
-            names = labels[one][touching]
-            a, b = balanced[one][touching], balanced[other][touching]
-            differ = np.linalg.norm(a - b, axis=1) / np.maximum(np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1))
-            outline += np.bincount(labels[one][edge], minlength=count + 1)
-            against += np.bincount(names, minlength=count + 1)
-            jump += np.bincount(names, np.nan_to_num(differ), minlength=count + 1)
+    names, inside, colors = labels.reshape(-1), core.reshape(-1), balanced.reshape(-1, 3)
+    for one, other in _borders(labels):
+        edge = names[one] > 0
+        touching = edge & inside[other]
+        a, b = colors[one[touching]], colors[other[touching]]
+        differ = np.linalg.norm(a - b, axis=1) / np.maximum(np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1))
+        outline += np.bincount(names[one[edge]], minlength=count + 1)
+        against += np.bincount(names[one[touching]], minlength=count + 1)
+        jump += np.bincount(names[one[touching]], np.nan_to_num(differ), minlength=count + 1)
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
     smooth = jump < _SMOOTH * np.maximum(against, 1)
     keep = (against > 0.45 * np.maximum(outline, 1)) & ((sizes <= small) | (smooth & (sizes <= large)))
     keep[0] = False
-    return keep[labels]
+    return keep.take(labels)
+
+
+def _borders(labels: NDArray) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Places, counted along the rows, of neighbors of different label: in all four directions."""
+    width = labels.shape[1]
+    down = np.flatnonzero(labels[1:] != labels[:-1])
+    y, x = np.divmod(np.flatnonzero(labels[:, 1:] != labels[:, :-1]), max(1, width - 1))
+    across = y * width + x
+    for low, high in ((down, down + width), (across, across + 1)):
+        yield low, high
+        yield high, low
 
 
 def _soft_edge(picture: Picture, small: NDArray, grown: NDArray[np.bool_], step: int) -> NDArray[np.uint8]:
@@ -447,10 +446,11 @@ def _soft_edge(picture: Picture, small: NDArray, grown: NDArray[np.bool_], step:
     columns = np.minimum(np.arange(width) // step, grown.shape[1] - 1)
     reach = 2 if step == 1 else 1  # half width of the band in which the outline may truly lie
     band = dilate(grown, reach) & ~erode(grown, reach)
-    y, x = np.nonzero(band)
+    y, x = np.divmod(np.flatnonzero(band), band.shape[1])
     reduced = Picture(small)
-    product, has_product = mean_nearby(reduced, grown & ~band, y, x, 2 * reach + 3)
-    behind, has_behind = mean_nearby(reduced, ~grown & ~band, y, x, 2 * reach + 3)
+    around = [window(2 * reach + 3)]
+    product, has_product = mean_at(reduced, grown & ~band, y, x, around)
+    behind, has_behind = mean_at(reduced, ~grown & ~band, y, x, around)
     across = product - behind
     length = np.einsum("ij,ij->i", across, across)
     known = has_product & has_behind & (length > 1e-6)
@@ -458,11 +458,12 @@ def _soft_edge(picture: Picture, small: NDArray, grown: NDArray[np.bool_], step:
     cell = np.full(grown.shape, -1, np.int32)
     cell[y, x] = np.where(known, np.arange(len(y)), -1)
 
+    whole = (grown * np.uint8(255)).take(columns, axis=1)
     result = np.empty((height, width), np.uint8)
     for top, bottom in strips(height, width):
-        part = grown[np.ix_(rows[top:bottom], columns)].astype(np.uint8) * np.uint8(255)
-        own = cell[np.ix_(rows[top:bottom], columns)]
-        y, x = np.nonzero(own >= 0)
+        part = whole.take(rows[top:bottom], axis=0)
+        own = cell[rows[top:bottom]].take(columns, axis=1)
+        y, x = np.divmod(np.flatnonzero(own >= 0), width)
         if len(y):
             k = own[y, x]
             cover = np.einsum("ij,ij->i", picture.at(y + top, x) - behind[k], across[k])

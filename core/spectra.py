@@ -15,7 +15,7 @@ import csv
 import difflib
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -459,8 +459,7 @@ def _response(
     sensors: Spectrum, unit: int, light: str | float | Spectrum, reflectance: Spectrum | None
 ) -> NDArray[np.float64]:
     """Responses at 1 nm, normalized to 1 in channel `unit` for the perfect diffuser."""
-    wavelengths = np.arange(np.ceil(sensors.wavelengths[0]), np.floor(sensors.wavelengths[-1]) + 1)
-    lit = illuminant(light).at(wavelengths, linear=True)[:, None] * sensors.at(wavelengths)
+    wavelengths, lit = _weights(sensors, illuminant(light))
     white = lit.sum(axis=0)
     if white[unit] <= 0:
         raise WhiteError("The light gives the observer or camera nothing to see: use another illuminant.")
@@ -471,3 +470,10 @@ def _response(
         samples = Spectrum(reflectance.wavelengths, np.eye(len(reflectance.wavelengths)))
         return reflectance.values.T @ (samples.at(wavelengths).T @ lit) / white[unit]
     return reflectance.at(wavelengths).T @ lit / white[unit]
+
+
+@lru_cache(maxsize=64)
+def _weights(sensors: Spectrum, light: Spectrum) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wavelengths (n,) at 1 nm and what sensors see of a light there (n, channels), not to be modified."""
+    wavelengths = np.arange(np.ceil(sensors.wavelengths[0]), np.floor(sensors.wavelengths[-1]) + 1)
+    return wavelengths, light.at(wavelengths, linear=True)[:, None] * sensors.at(wavelengths)

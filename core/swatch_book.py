@@ -150,8 +150,17 @@ class Book:
             hits += [Hit(name, int(k), found.swatches[k], float(difference)) for k, difference in pairs]
         return sorted(hits, key=lambda hit: hit.difference or 0.0)[:count]
 
-    def import_file(self, path: str | Path) -> Library:
+    def import_file(self, path: str | Path, inks: Inks | None = None) -> Library:
         """Copy a swatch file into the user's folder and return its library.
+
+        A folder of files, and a file with CMYK, are kept as a table of what was read.
+
+        Parameters
+        ----------
+        path
+            The file or folder.
+        inks
+            What CMYK means; see :func:`swatch_files.read`.
 
         Raises
         ------
@@ -159,14 +168,20 @@ class Book:
             If it cannot be read as swatches, or the folder has a file of that name already.
         """
         path = Path(path)
-        library = swatch_files.read(path)
-        if path.is_dir():
-            raise FileError(f"'{path}' is a folder: import its files one by one.")
-        target = self._writable() / path.name
+        library = swatch_files.read(path, inks)
+        as_table = path.is_dir() or inks is not None
+        target = self._writable() / (
+            f"{_file_name(path.resolve().name if path.is_dir() else path.stem)}.csv" if as_table else path.name
+        )
         if target.exists():
-            raise FileError(f"The swatch book has '{path.name}' already: rename the file, or remove the old one first.")
+            raise FileError(
+                f"The swatch book has '{target.name}' already: rename '{path.name}', or remove the old one first."
+            )
         try:
-            shutil.copyfile(path, target)
+            if as_table:
+                swatch_files.write(target, library)  # which loses nothing
+            else:
+                shutil.copyfile(path, target)
         except OSError as error:
             raise FileError(f"'{target}' could not be written ({error.strerror}): check the disk and folder.") from None
         self.reload()

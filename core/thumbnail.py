@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from . import colorimetry, recolor
 from .colorspace import SRGB
-from .picture import Picture, as_weights
+from .picture import Picture, as_weights, block_means
 from .recipe import Prepared
 from .region import shrink
 
@@ -39,8 +39,8 @@ def proxy_of(prepared: Prepared, longest: int = 128) -> Proxy:
     regions = prepared.regions()
     return Proxy(
         Picture(shrink(picture, step)),
-        tuple(None if r.mask is None else _means(as_weights(r.mask)[..., None], step)[..., 0] for r in regions),
-        tuple(None if r.extra is None else _means(r.extra, step) for r in regions),
+        tuple(None if r.mask is None else block_means(as_weights(r.mask)[..., None], step)[..., 0] for r in regions),
+        tuple(None if r.extra is None else block_means(r.extra, step) for r in regions),
     )
 
 
@@ -50,15 +50,6 @@ def thumbnail(proxy: Proxy, prepared: Prepared) -> NDArray[np.uint8]:
         replace(region, mask=mask, edge=None, extra=extra)
         for region, mask, extra in zip(prepared.regions(), proxy.masks, proxy.extras, strict=True)
     ]
-    linear, _ = recolor.recolor(proxy.picture, regions, threads=1)
-    space = prepared.space
-    adapt = colorimetry.adaptation_matrix(space.white, SRGB.white, "bradford")
-    shown = linear @ np.float32(SRGB.from_xyz @ adapt @ space.to_xyz).T
-    return recolor.recolor(Picture(shown), [], curve=SRGB.curve, dtype=np.uint8)[0]
-
-
-def _means(values: NDArray, step: int) -> NDArray[np.float32]:
-    """Means of blocks of a (height, width, n) map, as `region.shrink` has those of a picture."""
-    rows, columns, count = values.shape[0] // step, values.shape[1] // step, values.shape[2]
-    whole = values[: rows * step, : columns * step].reshape(rows, step, columns, step, count)
-    return whole.mean(axis=(1, 3), dtype=np.float32)
+    convert = colorimetry.conversion_matrix(prepared.space, SRGB) if prepared.space is not SRGB else None
+    codes, _ = recolor.recolor(proxy.picture, regions, curve=SRGB.curve, dtype=np.uint8, threads=1, convert=convert)
+    return codes

@@ -162,6 +162,12 @@ def _encode_table(curve: Curve, dtype: np.dtype) -> NDArray[np.unsignedinteger]:
     return table
 
 
+def byte_codes(curve: Curve) -> tuple[NDArray[np.uint8], bool]:
+    """(n,) codes that `encode` rounds light to, for n equal steps from 0 to 1 of it or, if told so, of its root."""
+    byte = np.dtype(np.uint8)
+    return _encode_table(curve, byte), _index(curve, byte).root
+
+
 class Decoder:
     """Codes to linear light, band by band, into given arrays.
 
@@ -229,7 +235,7 @@ def decode(codes: NDArray, curve: Curve) -> NDArray[np.float32]:
     Integer codes go through a table; float codes through the curve, unclamped.
     """
     if codes.dtype.kind == "u":
-        return np.take(decode_table(curve, codes.dtype), codes, mode="clip")
+        return Decoder(curve, codes.dtype).into(codes, np.empty(codes.shape, np.float32))
     if curve.is_linear:
         return codes.astype(np.float32)
     return curve.decode(codes).astype(np.float32)

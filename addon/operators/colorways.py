@@ -1,6 +1,6 @@
 """The list of colorways: named sets of targets for the regions of a photo."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
@@ -9,20 +9,14 @@ from .. import colorways
 from . import common
 from .regions import DIRECTIONS, free_name
 
+if TYPE_CHECKING:
+    from ..properties import DyehouseColorway, DyehousePhoto
 
-class _ColorwayOperator(common.RegionOperator):
+
+class _ColorwayOperator(common.ColorwaysOperator):
     """Base of operators about one colorway."""
 
     index: IntProperty(name="Colorway", description="-1 for the active one", default=-1, options={"SKIP_SAVE"})
-
-    @classmethod
-    def poll(cls, context):
-        """Gray the button out, with the reason, where there is no colorway."""
-        image = getattr(context, "edit_image", None)
-        if image is not None and not image.dyehouse.colorways:
-            cls.poll_message_set("The image has no colorway yet")
-            return False
-        return super().poll(context)
 
     def found(self, context: bpy.types.Context) -> tuple[Any, int]:
         """The settings of the image, and the index of the colorway."""
@@ -35,6 +29,14 @@ class _ColorwayOperator(common.RegionOperator):
             missing = "no active colorway: choose one" if self.index < 0 else f"no colorway {index + 1}: add it first"
             raise RecipeError(f"Image '{image.name}' has {missing}.")
         return settings, index
+
+
+def _added(settings: "DyehousePhoto", name: str) -> "DyehouseColorway":
+    """A new colorway under a free name like the given one; what was taken from the list before is void after it."""
+    taken = [other.name for other in settings.colorways]
+    added = settings.colorways.add()
+    added.name = free_name(name, taken)
+    return added
 
 
 class DYEHOUSE_OT_add_colorway(common.RegionOperator, bpy.types.Operator):
@@ -51,8 +53,7 @@ class DYEHOUSE_OT_add_colorway(common.RegionOperator, bpy.types.Operator):
         image = common.editable(common.image_of(context, self.image))
         common.region_index(image, 0)  # says in words if there is none
         settings = image.dyehouse
-        added = settings.colorways.add()
-        added.name = free_name(self.name or "Colorway", [other.name for other in settings.colorways[:-1]])
+        added = _added(settings, self.name or "Colorway")
         for region in settings.regions:
             colorways.copy(region.target, added.targets.add())
         settings.active_colorway = len(settings.colorways) - 1
@@ -68,10 +69,8 @@ class DYEHOUSE_OT_duplicate_colorway(_ColorwayOperator, bpy.types.Operator):
     def execute(self, context):
         """Put the copy after it."""
         settings, index = self.found(context)
-        added = settings.colorways.add()
-        original = settings.colorways[index]
-        added.name = free_name(original.name, [other.name for other in settings.colorways[:-1]])
-        for target in original.targets:
+        added = _added(settings, settings.colorways[index].name)
+        for target in settings.colorways[index].targets:
             colorways.copy(target, added.targets.add())
         settings.colorways.move(len(settings.colorways) - 1, index + 1)
         settings.active_colorway = index + 1

@@ -154,3 +154,16 @@ class RegionOperator(ImageOperator):
             cls.poll_message_set("The image has no region yet")
             return False
         return True
+
+
+class ColorwaysOperator(RegionOperator):
+    """Base of operators about the colorways of an image."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Gray the button out, with the reason, in an Image Editor whose image has no colorway."""
+        image = getattr(context, "edit_image", None)
+        if image is not None and not image.dyehouse.colorways:
+            cls.poll_message_set("The image has no colorway yet")
+            return False
+        return super().poll(context)

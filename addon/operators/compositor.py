@@ -227,15 +227,4 @@ def _matte(node: bpy.types.Node, scene: bpy.types.Scene, names: str, layer: str)
 
 
 CLASSES = (DYEHOUSE_OT_add_compositor_group,)
-
-
-def register() -> None:
-    """Offer the operator."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take it back."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -106,6 +106,7 @@ class DYEHOUSE_OT_load_recipe(_RecipeFile, bpy.types.Operator):
         pattern = stored.output.pattern
         settings.output_pattern = pattern if Path(pattern).is_absolute() else f"//{pattern}"
         settings.quality = stored.output.quality
+        settings.output_space = stored.output.output_space or "PHOTO"
         for name in lost:
             self.report({"WARNING"}, f"The panel has no setting for '{name}' of the recipe: it is left out")
         self.report({"INFO"}, f"Loaded {self.filepath} for '{image.name}'")
@@ -146,7 +147,9 @@ def _check_names(kind: str, names: list[str]) -> None:
 def _output(image: bpy.types.Image) -> "Output":
     from ...core.recipe_file import Output
 
-    return Output(image.dyehouse.output_pattern.removeprefix("//"), image.dyehouse.quality)
+    asked = image.dyehouse
+    space = recipes.output_space(image) or None
+    return Output(asked.output_pattern.removeprefix("//"), asked.quality, output_space=space)
 
 
 def _with_mask_files(

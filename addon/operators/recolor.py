@@ -86,6 +86,7 @@ class DYEHOUSE_OT_recolor(_AskingOperator, bpy.types.Operator):
     overwrite: BoolProperty(name="Overwrite", description="Replace a file that is there", options={"SKIP_SAVE"})
     quality: IntProperty(name="Quality", description="Of JPEG and WebP files", default=95, min=1, max=100)
     compression: _text("Compression", "Of TIFF and EXR files, such as zip or none; empty for the photo's")
+    output_space: _text("Output Space", "Color space of the file, such as display-p3; empty for the photo's")
 
     @common.reporting
     def execute(self, context):
@@ -102,7 +103,8 @@ class DYEHOUSE_OT_recolor(_AskingOperator, bpy.types.Operator):
             done = f"New image '{made.name}'"
         else:
             options = {"quality": self.quality, "compression": self.compression or None}
-            shares = writing.save(look.photo, look.prepared, path, overwrite=self.overwrite, **options)
+            photo = writing.in_space(look.photo, self.output_space)
+            shares = writing.save(photo, look.prepared, path, overwrite=self.overwrite, **options)
             done = f"Wrote {path}"
         for warning in with_shares(report(look.photo, look.prepared), shares)["warnings"]:
             self.report({"WARNING"}, warning)

@@ -8,6 +8,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from .. import recipes, swatches
 from . import common
+from .regions import free_name
 
 
 class DYEHOUSE_OT_set_target(common.RegionOperator, bpy.types.Operator):
@@ -118,7 +119,7 @@ class DYEHOUSE_OT_copy_target(common.RegionOperator, bpy.types.Operator):
 
 
 class DYEHOUSE_OT_import_swatches(bpy.types.Operator, ImportHelper):
-    """Add swatch files to the swatch book"""
+    """Add swatch files, or a folder of them as one library, to the swatch book"""
 
     bl_idname = "dyehouse.import_swatches"
     bl_label = "Import Swatches"
@@ -127,13 +128,22 @@ class DYEHOUSE_OT_import_swatches(bpy.types.Operator, ImportHelper):
     )
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    cmyk: StringProperty(
+        name="CMYK Profile",
+        description="ICC profile of the printer, for CMYK swatches; without it they are left out",
+        subtype="FILE_PATH",
+        options=common.PATH,
+    )
 
     @common.reporting
     def execute(self, context):
         """Copy the files into the user's folder, after they have been read."""
+        from ...core.swatch_files.printer import inks_as
+
+        inks = inks_as(common.absolute(self.cmyk)) if self.cmyk else None
         chosen = [Path(self.directory) / each.name for each in self.files if each.name] or [Path(self.filepath)]
         for path in chosen:
-            library = swatches.book().import_file(path)
+            library = swatches.book().import_file(path, inks)
             self.report({"INFO"}, f"{library.name}: {len(library)} swatches")
             for note in library.notes:
                 self.report({"WARNING"}, note)
@@ -204,8 +214,10 @@ class DYEHOUSE_OT_swatches_from_palette(bpy.types.Operator):
         colors = [recipes.in_rec709(entry.color) for entry in palette.colors]
         if not colors:
             raise FileError(f"Palette '{palette.name}' is empty: add colors first.")
-        swatches.book().keep(palette.name, Library.from_linear_colors(palette.name, colors).swatches)
+        name = free_name(palette.name, list(swatches.book().names))
+        swatches.book().keep(name, Library.from_linear_colors(name, colors).swatches)
         swatches.changed()
+        self.report({"INFO"}, f"{name}: {len(colors)} swatches")
 
 
 class DYEHOUSE_OT_swatches_to_palette(bpy.types.Operator):
@@ -237,15 +249,4 @@ CLASSES = (
     DYEHOUSE_OT_swatches_from_palette,
     DYEHOUSE_OT_swatches_to_palette,
 )
-
-
-def register() -> None:
-    """Add the operators."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Remove them."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,8 +1,5 @@
 """Recolor a material's base color texture: live, by a node group, or for good, into a new image."""
 
-import threading
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -16,7 +13,7 @@ from bpy.props import (
 )
 
 from .. import images, masks, nodes, properties, recipes, writing
-from . import common
+from . import common, modal
 
 if TYPE_CHECKING:
     from ...core.recipe import Prepared, Recipe
@@ -199,10 +196,14 @@ class MaterialOperator:
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Take the selected Image Texture node of the Shader Editor."""
+        self.take_selected(context)
+        return self.execute(context)
+
+    def take_selected(self, context: bpy.types.Context) -> None:
+        """Take the selected Image Texture node of the Shader Editor as the node, if none is given."""
         active = getattr(context, "active_node", None)
         if not self.node and active is not None and active.bl_idname == "ShaderNodeTexImage" and active.select:
             self.node = active.name
-        return self.execute(context)
 
 
 def material_in(context: bpy.types.Context) -> bpy.types.Material | None:
@@ -367,7 +368,41 @@ class DYEHOUSE_OT_remove_recolor(MaterialOperator, bpy.types.Operator):
         return scene, scene.compositing_node_group
 
 
-class DYEHOUSE_OT_bake_texture(TextureArguments, bpy.types.Operator):
+class _Job(modal.Job):
+    """Bakes a texture; what it is for is known by names, as references do not outlive an undo."""
+
+    def __init__(self, texture: "textures.Texture | textures.Live", material: str, node: str, image: str) -> None:
+        super().__init__()
+        self.texture, self.material, self.node, self.image = texture, material, node, image
+        self.tiles: dict[int, textures.Baked] = {}
+
+    def work(self) -> "dict[int, textures.Baked]":
+        """Recolor all tiles."""
+        return self.texture.bake(self.watch)
+
+    def finish(self, made: "dict[int, textures.Baked]") -> bool:
+        """Keep them for the image."""
+        self.tiles = made
+        return False
+
+    def progress(self) -> tuple[float, int, str]:
+        """Share of the texture that is baked."""
+        return self._share, 1, "Stopping" if self.stopping else f"Baking {self.texture.name}"
+
+    def rest(self) -> str:
+        """Nothing."""
+        return "no image was made"
+
+    def close(self) -> None:
+        """Remove the temporary files."""
+        self.texture.close()
+
+
+_SLOT = modal.Slot("A texture is being baked; Esc stops it")
+progress = _SLOT.progress
+
+
+class DYEHOUSE_OT_bake_texture(modal.JobOperator, TextureArguments, bpy.types.Operator):
     """Recolor the material's base color texture into a new image of the same size, depth and color space;
     a live recolor node on the texture says what is done, unless arguments do
     """
@@ -376,6 +411,7 @@ class DYEHOUSE_OT_bake_texture(TextureArguments, bpy.types.Operator):
     bl_label = "Bake Recolored Texture"
     bl_options = {"REGISTER", "UNDO"}
 
+    slot = _SLOT
     name: StringProperty(
         name="Name",
         description="Name of the new image; empty for the texture's name and Recolored",
@@ -393,57 +429,11 @@ class DYEHOUSE_OT_bake_texture(TextureArguments, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Bake in a thread, while the window goes on."""
-        return super().invoke(context, event) if bpy.app.background else self._begin(context)
+        self.take_selected(context)
+        return super().invoke(context, event)
 
-    @common.reporting
-    def execute(self, context: bpy.types.Context) -> None:
-        """Bake now."""
-        job = self._job(context)
-        try:
-            self._finish(job, job.texture.bake())
-        finally:
-            job.texture.close()
-
-    @common.reporting
-    def _begin(self, context: bpy.types.Context) -> set[str]:
-        global _running
-        job = self._job(context)
-        timer = context.window_manager.event_timer_add(0.1, window=context.window)
-        _running = _Running(job, timer, ThreadPoolExecutor(1))
-        _running.begin()
-        context.window_manager.progress_begin(0, 100)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    @common.reporting
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Show how far it is; make the image when the thread is done."""
-        running = _running
-        if running is None:  # the extension was disabled
-            return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
-            running.stop.set()
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        if not running.result.done():
-            context.window_manager.progress_update(round(100 * running.share))
-            context.workspace.status_text_set(f"Baking {running.job.texture.name}, {running.share:.0%}; Esc: Stop")
-            return {"PASS_THROUGH"}
-        try:
-            self._finish(running.job, running.result.result())
-        except _Stopped:
-            self.report({"WARNING"}, "Stopped: no image was made")
-            return {"CANCELLED"}
-        finally:
-            _end()
-        return None
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Stop because Blender ends or opens another file."""
-        _end()
-
-    def _job(self, context: bpy.types.Context) -> "_Job":
+    def job(self, context: bpy.types.Context) -> "_Job":
+        """Of the texture that the arguments or the context say."""
         from ...core.errors import DyehouseError
         from .. import textures
 
@@ -465,7 +455,7 @@ class DYEHOUSE_OT_bake_texture(TextureArguments, bpy.types.Operator):
                 raise
         return _Job(texture, material.name, node.name, node.image.name)
 
-    def _finish(self, job: "_Job", tiles: "dict[int, textures.Baked]") -> None:
+    def ended(self, job: "_Job") -> None:
         """Make the image; until now nothing has changed."""
         from ...core.errors import RecipeError
         from .. import textures
@@ -477,7 +467,7 @@ class DYEHOUSE_OT_bake_texture(TextureArguments, bpy.types.Operator):
             raise RecipeError(f"The texture of material '{job.material}' was changed meanwhile: bake again.")
         name = self.name or f"{writing.stem_of(source)} Recolored"
         output = common.absolute(self.output) if self.output else None
-        image = textures.stored(name, tiles, source.source == "TILED", None, output)
+        image = textures.stored(name, job.tiles, source.source == "TILED", None, output)
         image.alpha_mode = source.alpha_mode
         image.use_fake_user = True  # or it would not be saved before something shows it
         if self.use:
@@ -488,78 +478,8 @@ class DYEHOUSE_OT_bake_texture(TextureArguments, bpy.types.Operator):
         self.report({"INFO"}, f"Baked {image.name}")
 
 
-class _Stopped(Exception):  # noqa: N818, no error
-    """The user does not want it any more."""
-
-
-@dataclass(frozen=True)
-class _Job:
-    """What is baked, by names: references do not outlive an undo."""
-
-    texture: "textures.Texture | textures.Live"
-    material: str
-    node: str
-    image: str
-
-
-@dataclass
-class _Running:
-    """The bake that the window goes on with."""
-
-    job: _Job
-    timer: Any
-    pool: ThreadPoolExecutor
-    share: float = 0.0
-    stop: threading.Event = field(default_factory=threading.Event)
-
-    def begin(self) -> None:
-        """Start the thread."""
-        self.result = self.pool.submit(self.job.texture.bake, self._watch)
-
-    def _watch(self, share: float) -> None:
-        self.share = share
-        if self.stop.is_set():
-            raise _Stopped
-
-
-_running: _Running | None = None
-
-
-def progress() -> float | None:
-    """Share of the texture that is baked, 0 to 1; None if nothing is."""
-    return _running.share if _running else None
-
-
-def _end() -> None:
-    """Leave the window as it was, whatever became of the bake."""
-    global _running
-    if _running is None:
-        return
-    running, _running = _running, None
-    running.stop.set()
-    running.pool.shutdown()
-    running.job.texture.close()
-    manager = bpy.context.window_manager
-    manager.event_timer_remove(running.timer)
-    manager.progress_end()
-    if bpy.context.workspace:
-        bpy.context.workspace.status_text_set(None)
-
-
 # Arguments that say how to recolor.
 _ASKING = (*RecipeArguments.__annotations__, "mask", "tile", "image_settings")
 
 CLASSES = (DYEHOUSE_OT_recolor_texture, DYEHOUSE_OT_remove_recolor, DYEHOUSE_OT_bake_texture)
-
-
-def register() -> None:
-    """Offer the operators."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them back."""
-    _end()
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = modal.registration(_SLOT, CLASSES)

@@ -1,8 +1,6 @@
 """Writing what the panel shows: to an image of the .blend, to a file, or all colorways to files."""
 
-import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,18 +8,13 @@ from typing import TYPE_CHECKING, Any
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from .. import background, recipes, session, writing
-from . import common
+from .. import images, recipes, session, writing
+from . import common, modal
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from ...batch.files import Photo
     from ...core.recipe import Colorway, Prepared, Recipe
     from ...core.recolor import Shares
-
-# Seconds between looks at the thread that writes.
-_INTERVAL = 0.05
 
 
 def _overwrite() -> Any:
@@ -50,11 +43,7 @@ def shown_name(image: bpy.types.Image) -> str:
 # --- the work -------------------------------------------------------------------------------------------------
 
 
-class _Stopped(Exception):  # noqa: N818, no error
-    """The user does not want the rest."""
-
-
-class _Job:
+class _Job(modal.Job):
     """Writes colorways of a photo, one after the other.
 
     Parameters
@@ -87,56 +76,50 @@ class _Job:
         overwrite: bool = False,
         quality: int = 95,
     ) -> None:
+        super().__init__()
         self._image, self._colorways, self.paths = image.session_uid, colorways, paths
         for path in paths:
             writing.check(path, image, overwrite)
-        self._begun = session.begin(image, recipe)
-        self._upright = cache(partial(_upright, self._begun))
-        self._options: dict[str, Any] = {"overwrite": overwrite, "quality": quality, "watch": self._watch}
-        self._stop = threading.Event()
-        self._share = 0.0
+        self._begun, self._space = session.begin(image, recipe), recipes.output_space(image)
+        self._upright = cache(partial(_upright, self._begun, self._space))
+        self._options: dict[str, Any] = {"overwrite": overwrite, "quality": quality, "watch": self.watch}
         self.written = 0
         self.warnings: set[str] = set()
 
-    def recolor_next(self) -> Callable[[], Any]:
-        """Recolor the next colorway, in any thread; returns what the main thread must call for its file.
+    def work(self) -> Callable[[], Any]:
+        """Recolor the next colorway; returns what Blender's thread must call for its file.
 
         Raises
         ------
-        _Stopped
+        Stopped
             After `stop`; then the file does not appear.
         DyehouseError
             If the photo cannot be recolored, or the file not be written.
         """
         photo, found = self._upright()
-        self._watch(0.0)
+        self.watch(0.0)
         prepared, path = found.for_colorway(self._colorways[self.written]), self.paths[self.written]
         self.warnings.update(prepared.warnings)
         complete = writing.begin(photo, prepared, path, **self._options)
         _delivered[self._image] = writing.verified(photo, prepared, path)
         return complete
 
-    def finish(self, complete: Callable[[], Any]) -> bool:
-        """Complete the file, in the main thread; tells whether there is more to do."""
-        shares = complete()
+    def finish(self, made: Callable[[], Any]) -> bool:
+        """Complete the file; tells whether there is another."""
+        shares = made()
         self.warnings.update(_unheld(shares))
         self.written, self._share = self.written + 1, 0.0
         return self.written < len(self.paths)
 
-    def stop(self) -> None:
-        """End as soon as possible."""
-        self._stop.set()
-
     def progress(self) -> tuple[float, int, str]:
         """How many files are done, of how many, and what is going on."""
-        if self._stop.is_set():
+        if self.stopping:
             return self.written, len(self.paths), "Stopping"
         return self.written + self._share, len(self.paths), f"Writing {self.paths[self.written].name}"
 
-    def _watch(self, share: float) -> None:
-        self._share = share
-        if self._stop.is_set():
-            raise _Stopped
+    def rest(self) -> str:
+        """How many were written."""
+        return f"{_count(self)} written"
 
 
 class _ImageJob(_Job):
@@ -145,19 +128,18 @@ class _ImageJob(_Job):
     def __init__(self, image: bpy.types.Image, recipe: "Recipe", name: str) -> None:
         super().__init__(image, recipe, (), ())
         self.paths = (Path(name),)
-        self._name = name
-        self.made = ""
+        self.name, self._working = name, images.working_space()
 
-    def recolor_next(self) -> Callable[[], Any]:
-        """Recolor what is shown; the image is made in the main thread."""
-        self._watch(0.0)
+    def work(self) -> Callable[[], Any]:
+        """Recolor what is shown; the image is made in Blender's thread."""
+        self.watch(0.0)
         look = self._begun()
         self.warnings.update(look.prepared.warnings)
-        make = writing.begin_image(look.photo, look.prepared, self._name, self._watch)
+        make = writing.begin_image(look.photo, look.prepared, self.name, self._working, self.watch)
 
         def complete() -> Any:
             image, shares = make()
-            self.made = image.name
+            self.name = image.name
             return shares
 
         return complete
@@ -178,116 +160,31 @@ def delivered(image: bpy.types.Image) -> list[str]:
     return _delivered.get(image.session_uid, [])
 
 
-def _upright(look: Callable[[], session.Look]) -> "tuple[Photo, Prepared]":
+def _upright(look: Callable[[], session.Look], space: str) -> "tuple[Photo, Prepared]":
     from ...batch.photo import upright
 
     found = look()
-    return upright(found.photo, found.prepared)
+    return upright(writing.in_space(found.photo, space), found.prepared)
 
 
-@dataclass
-class _Running:
-    """The job that the window goes on with, and what belongs to it."""
-
-    job: _Job
-    timer: Any
-    part: "Future[Callable[[], Any]]"
-    shown: str = ""
+_SLOT = modal.Slot("Files are being written; Esc stops it")
+progress = _SLOT.progress
 
 
-_running: _Running | None = None
+class _Writing(modal.JobOperator, common.RegionOperator):
+    """Base of operators that write."""
 
-
-def progress() -> tuple[float, int, str] | None:
-    """How many colorways have been written, of how many, and what is going on; None if nothing is."""
-    return _running.job.progress() if _running else None
-
-
-class _Writing(common.RegionOperator):
-    """Runs a job: in a thread while the window goes on, or at once for scripts."""
-
-    report: Callable[..., None]
-
-    @classmethod
-    def poll(cls, context):
-        """Gray the button out while files are written."""
-        if _running is not None:
-            cls.poll_message_set("Files are being written; Esc stops it")
-            return False
-        return super().poll(context)
+    slot = _SLOT
 
     def ended(self, job: _Job) -> None:
-        """Tell what was made."""
-        raise NotImplementedError
-
-    def at_once(self, job: _Job) -> None:
-        """Do the job now."""
-        while job.finish(job.recolor_next()):
-            pass
-        self._end_well(job)
-
-    def go_on(self, context: bpy.types.Context, job: _Job) -> set[str]:
-        """Do the job in a thread."""
-        global _running
-        timer = context.window_manager.event_timer_add(_INTERVAL, window=context.window)
-        _running = _Running(job, timer, _in_thread(job.recolor_next))
-        context.window_manager.progress_begin(0, 100)
-        context.window_manager.modal_handler_add(self)
-        self._show(context)
-        return {"RUNNING_MODAL"}
-
-    @common.reporting
-    def modal(self, context, event):
-        """Show how far it is, and begin the next file."""
-        running = _running
-        if running is None:  # the extension was disabled, or another .blend opened
-            return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
-            running.job.stop()
-            self._show(context)
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        self._show(context)
-        if not running.part.done():
-            return {"PASS_THROUGH"}
-        more = False
-        try:
-            more = running.job.finish(running.part.result())
-        except _Stopped:
-            self.report({"WARNING"}, f"Stopped: {_count(running.job)} written")
-            return {"CANCELLED"}
-        finally:
-            if more:
-                running.part = _in_thread(running.job.recolor_next)
-            else:
-                _end(context)
-        if more:
-            return {"PASS_THROUGH"}
-        self._end_well(running.job)
-        return {"FINISHED"}
-
-    def cancel(self, context):
-        """Stop because Blender ends or opens another file."""
-        _end(context)
-
-    def _end_well(self, job: _Job) -> None:
+        """Tell what the user should know, and what was made."""
         for warning in sorted(job.warnings):
             self.report({"WARNING"}, warning)
-        self.ended(job)
+        self.report({"INFO"}, self.made(job))
 
-    def _show(self, context: bpy.types.Context) -> None:
-        found = progress()
-        if _running is None or found is None:
-            return
-        done, total, doing = found
-        percent = round(100 * done / total)
-        text = f"{doing} ({percent}%); Esc: Stop"
-        if text != _running.shown:
-            _running.shown = text
-            context.window_manager.progress_update(percent)
-            context.workspace.status_text_set(text)
-            _redraw_sidebars()
+    def made(self, job: Any) -> str:
+        """What was made, in words."""
+        raise NotImplementedError
 
 
 class DYEHOUSE_OT_write_image(_Writing, bpy.types.Operator):
@@ -298,24 +195,15 @@ class DYEHOUSE_OT_write_image(_Writing, bpy.types.Operator):
 
     result: StringProperty(name="Name", description="Of the new image; empty for a name", options={"SKIP_SAVE"})
 
-    @common.reporting
-    def execute(self, context):
-        """Make it now."""
-        self.at_once(self._job(context))
-
-    @common.reporting
-    def invoke(self, context, event):
-        """Make it while the window goes on."""
-        return self.go_on(context, self._job(context))
-
-    def _job(self, context: bpy.types.Context) -> _Job:
+    def job(self, context):
+        """Of what is shown."""
         image = common.image_of(context, self.image)
         name = self.result or f"{writing.stem_of(image)}-{shown_name(image)}"
         return _ImageJob(image, recipes.shown(image), name)
 
-    def ended(self, job):
+    def made(self, job):
         """Tell the name."""
-        self.report({"INFO"}, f"New image '{job.made}'")
+        return f"New image '{job.name}'"
 
 
 class DYEHOUSE_OT_write_file(_Writing, bpy.types.Operator):
@@ -358,12 +246,12 @@ class DYEHOUSE_OT_write_file(_Writing, bpy.types.Operator):
             return self.go_on(context, job)
         return self.at_once(job)
 
-    def ended(self, job):
+    def made(self, job):
         """Tell the file."""
-        self.report({"INFO"}, f"Wrote {job.paths[0]}")
+        return f"Wrote {job.paths[0]}"
 
 
-class DYEHOUSE_OT_write_colorways(_Writing, bpy.types.Operator):
+class DYEHOUSE_OT_write_colorways(_Writing, common.ColorwaysOperator, bpy.types.Operator):
     """Write every colorway to a file; Esc stops after the files that are complete"""
 
     bl_idname = "dyehouse.write_colorways"
@@ -378,34 +266,16 @@ class DYEHOUSE_OT_write_colorways(_Writing, bpy.types.Operator):
     overwrite: _overwrite()
     quality: _quality()
 
-    @classmethod
-    def poll(cls, context):
-        """Gray the button out where there is nothing to write."""
-        image = getattr(context, "edit_image", None)
-        if image is not None and not image.dyehouse.colorways:
-            cls.poll_message_set("The image has no colorway yet")
-            return False
-        return super().poll(context)
-
-    @common.reporting
-    def execute(self, context):
-        """Write them now."""
-        self.at_once(self._job(context))
-
-    @common.reporting
-    def invoke(self, context, event):
-        """Write them in a thread, while the window goes on."""
-        return self.go_on(context, self._job(context))
-
-    def _job(self, context: bpy.types.Context) -> _Job:
+    def job(self, context):
+        """Of all colorways, as the panel says where arguments do not."""
         image = common.image_of(context, self.image)
         settings = image.dyehouse
         overwrite, quality = self.overwrite or settings.overwrite, self.quality or settings.quality
         return all_colorways(image, self.pattern or settings.output_pattern, overwrite, quality)
 
-    def ended(self, job):
+    def made(self, job):
         """Tell how many."""
-        self.report({"INFO"}, f"{_count(job)} written to {job.paths[0].parent}")
+        return f"{_count(job)} written to {job.paths[0].parent}"
 
 
 def all_colorways(image: bpy.types.Image, pattern: str, overwrite: bool, quality: int) -> _Job:
@@ -427,57 +297,10 @@ def all_colorways(image: bpy.types.Image, pattern: str, overwrite: bool, quality
     return _Job(image, recipe, recipe.colorways, paths, overwrite, quality)
 
 
-def _redraw_sidebars() -> None:
-    for area in background.image_editors():
-        for region in area.regions:
-            if region.type == "UI":
-                region.tag_redraw()
-
-
 def _count(job: _Job) -> str:
     total = len(job.paths)
     return f"{job.written} of {total} colorways" if job.written < total else f"{total} colorway{'s' * (total > 1)}"
 
 
-def _in_thread(function: Callable[[], Any]) -> "Future[Any]":
-    from concurrent.futures import Future
-
-    future: Future[Any] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(function())
-        except Exception as error:  # for the main thread
-            future.set_exception(error)
-
-    threading.Thread(target=run, daemon=True).start()
-    return future
-
-
-def _end(context: bpy.types.Context) -> None:
-    """Stop the job that runs, and take away what shows it."""
-    global _running
-    if _running is None:
-        return
-    _running.job.stop()
-    context.window_manager.event_timer_remove(_running.timer)
-    context.window_manager.progress_end()
-    if context.workspace:
-        context.workspace.status_text_set(None)
-    _running = None
-    _redraw_sidebars()
-
-
 CLASSES = (DYEHOUSE_OT_write_image, DYEHOUSE_OT_write_file, DYEHOUSE_OT_write_colorways)
-_register, _unregister = bpy.utils.register_classes_factory(CLASSES)
-
-
-def register() -> None:
-    """Offer the operators."""
-    _register()
-
-
-def unregister() -> None:
-    """Stop what is being written, and take the operators back."""
-    _end(bpy.context)
-    _unregister()
+register, unregister = modal.registration(_SLOT, CLASSES)

@@ -62,10 +62,6 @@ def _block(lines: list[str], start: int, end: str, name: str) -> tuple[list[tupl
 def _add_sets(
     titles: list[str], title_line: int, block: list[tuple[int, list[str]]], keywords: str, name: str, found: Collector
 ) -> None:
-    if "SPECTRAL_NM" in titles:
-        raise LineError(
-            name, title_line, "the spectra are pairs of wavelength and value", "export a field for each wavelength"
-        )
     for line, row in block:
         if len(row) != len(titles):
             raise LineError(
@@ -78,10 +74,48 @@ def _add_sets(
     observer = re.search(r'OBSERVER(?:_?ANGLE)?"?[\s,"=]+(10|2|1931|1964)', keywords, re.IGNORECASE)
     if not light and any(title.startswith(("LAB_", "XYZ_")) for title in titles):
         found.note("The file names no illuminant: taken as D50.")
-    columns = Columns(
-        titles, name, title_line, found, light[1] if light else "D50", observer[1] if observer else "1931"
-    )
-    columns.add(block)
+    stated = light[1] if light else "D50", observer[1] if observer else "1931"
+    for fields, sets in _without_pairs(titles, title_line, block, name):
+        Columns(fields, name, title_line, found, *stated).add(sets)
+
+
+# Fields that follow a wavelength, and what their values are to be multiplied by.
+_OF_PAIRS = {"SPECTRAL_DEC": 1.0, "SPECTRAL_PCT": 0.01}
+
+
+def _without_pairs(
+    titles: list[str], title_line: int, block: list[tuple[int, list[str]]], name: str
+) -> list[tuple[list[str], list[tuple[int, list[str]]]]]:
+    """Give spectra that are pairs of wavelength and value, in one set or several of a sample, a field a wavelength.
+
+    Returns
+    -------
+    A table for each choice of wavelengths: its fields, and its sets with their lines.
+    """
+    places = [k for k, title in enumerate(titles) if title == "SPECTRAL_NM"]
+    if not places:
+        return [(titles, block)]
+    following = [titles[k + 1] if k + 1 < len(titles) else "nothing" for k in places]
+    if odd := set(following) - set(_OF_PAIRS):
+        raise LineError(
+            name, title_line, f"SPECTRAL_NM is followed by {clean(odd.pop())[:40]}", f"write {' or '.join(_OF_PAIRS)}"
+        )
+    others = [k for k in range(len(titles)) if k not in places and k - 1 not in places]
+    samples: dict[tuple[str, ...], tuple[int, dict[float, str]]] = {}
+    for line, row in block:
+        _, pairs = samples.setdefault(tuple(row[k] for k in others), (line, {}))
+        for k in places:
+            try:
+                pairs[float(row[k])] = repr(float(row[k + 1]) * _OF_PAIRS[titles[k + 1]])
+            except ValueError:
+                raise LineError(
+                    name, line, f"'{clean(f'{row[k]} {row[k + 1]}')[:60]}' is no pair of numbers", "mend it"
+                ) from None
+    tables: dict[tuple[float, ...], list[tuple[int, list[str]]]] = {}
+    for label, (line, pairs) in samples.items():
+        tables.setdefault(tuple(pairs), []).append((line, [*label, *pairs.values()]))
+    labels = [titles[k] for k in others]
+    return [([*labels, *(f"SPECTRAL_NM{nm:g}" for nm in table)], sets) for table, sets in tables.items()]
 
 
 def write(library: Library) -> tuple[bytes, list[str]]:

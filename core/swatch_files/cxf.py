@@ -1,7 +1,8 @@
 """Color Exchange Format, CxF3 (ISO 17972-1): spectra, Lab, XYZ, LCh, xyY and RGB, with illuminant and observer.
 
-Of the values that an object has, the first of these is taken that can be used: spectrum, Lab, XYZ, LCh, xyY, Adobe RGB,
-sRGB, HTML, RGB, CMYK. Groups are the `ObjectType` where a file has several.
+Of the values that an object has, the first of these is taken that can be used: spectrum (in equal steps, or point by
+point), Lab, XYZ, LCh, xyY, Adobe RGB, sRGB, HTML, RGB, CMYK. Groups are the `ObjectType` where a file has several. An
+illuminant of the file's own is its power, or else the white that the file gives for it.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import colorimetry, spectra
 from ..errors import DyehouseError, FileError
 from ..library import Library
 from ..spectra import Spectrum
-from ..swatches import Encoded, Stimulus, Swatch
+from ..swatches import Encoded, Stimulus, Swatch, Triple
 from .reading import Collector, Inks, LineError, clean, losses
 
 NAMESPACE = "http://colorexchangeformat.com/CxF3-core"
@@ -129,6 +131,10 @@ class _Reader:
         try:
             if node.tag == "ReflectanceSpectrum":
                 return self._spectrum(node, name)
+            if node.tag == "CustomSpectrum":
+                kind = self._specification(node, "MeasurementType")
+                reflects = kind is not None and kind.content == "Spectrum_Reflectance"
+                return self._reflectance(*self._points(node), name) if reflects else None
             if node.tag == "ColorHTML":
                 code = node.attributes.get("HTML", "").removeprefix("#")
                 red, green, blue = np.frombuffer(bytes.fromhex(code), np.uint8) / 255
@@ -177,7 +183,18 @@ class _Reader:
         first, step = self._float(start, node, "StartWL"), self._float(stated.get("Increment", "10"), node, "Increment")
         if not (100 <= first <= 3000 and 0 < step <= 100):
             raise LineError(self._name, node.line, f"the spectrum starts at {first:g} nm in steps of {step:g}", _REMEDY)
-        wavelengths = first + step * np.arange(len(values), dtype=np.float64)
+        return self._reflectance(first + step * np.arange(len(values), dtype=np.float64), values, name)
+
+    def _points(self, node: _Node) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return wavelengths and values of a spectrum that is given point by point."""
+        found = {
+            self._float(point.attributes.get("WL", ""), point, "WL"): self._float(point.content, point, "a value")
+            for point in node.all("SpectralPoint")
+        }
+        wavelengths = np.array(sorted(found))
+        return wavelengths, np.array([found[nm] for nm in wavelengths.tolist()])
+
+    def _reflectance(self, wavelengths: NDArray, values: NDArray, name: str) -> Swatch | None:
         if not spectra.covers(wavelengths):
             self._found.note(
                 "Spectra that do not cover 400 to 700 nm are left out; Lab or RGB is taken, if there is any."
@@ -195,33 +212,75 @@ class _Reader:
             self._found.note("RGB names no color space: taken as sRGB.")
         return Swatch(name, Encoded((red, green, blue), "adobe-rgb" if node.tag == "ColorAdobeRGB" else "srgb"))
 
-    def _colorimetric(self, node: _Node, name: str) -> Swatch:
-        light, observer = self._light(node)
+    def _colorimetric(self, node: _Node, name: str) -> Swatch | None:
+        specification = self._specification(node, "TristimulusSpec")
+        observer = self._observer(specification)
+        seen_under = self._white(specification, observer)
+        if seen_under is None:
+            return None
+        white, light = seen_under
         numbers = self._numbers(node, _TAGS[node.tag])
         if node.tag == "ColorCIELab":
-            made = Swatch.from_lab(numbers, light, observer)
+            xyz = colorimetry.lab_to_xyz(numbers, white)
         elif node.tag == "ColorCIELCh":
-            made = Swatch.from_lab(colorimetry.lch_to_lab(numbers), light, observer)
+            xyz = colorimetry.lab_to_xyz(colorimetry.lch_to_lab(numbers), white)
         elif node.tag == "ColorCIEXYZ":
-            made = Swatch.from_xyz(np.array(numbers) / 100, light, observer)
+            xyz = np.array(numbers) / 100
         else:
             x, y, luminance = numbers
-            made = Swatch.from_xyz(colorimetry.xyy_to_xyz([x, y, luminance / 100]), light, observer)
-        return Swatch(name, made.color)
+            xyz = colorimetry.xyy_to_xyz([x, y, luminance / 100])
+        X, Y, Z = xyz.tolist()
+        return Swatch(name, Stimulus((X, Y, Z), white, light, observer))
 
-    def _light(self, node: _Node) -> tuple[str | Spectrum, str]:
-        """Return illuminant and observer of a colorimetric node."""
-        specification = self._specification(node, "TristimulusSpec")
+    def _observer(self, specification: _Node | None) -> str:
+        node = specification.first("Observer") if specification else None
+        if node is not None and node.content == "Custom_CMF":
+            self._found.note("The file has an observer of its own: the CIE's for the same angle is taken.")
+            angle = self._float(node.attributes.get("Angle", "2"), node, "Angle")
+            return "1964" if angle > 4 else "1931"  # as CIE 15:2018, 6, has it
+        return "1964" if node is not None and node.content.startswith("10") else "1931"
+
+    def _white(self, specification: _Node | None, observer: str) -> tuple[Triple, str] | None:
+        """Return XYZ of the white of colorimetric nodes, and the name of its light; None where it is not known."""
         light = specification.first("Illuminant") if specification else None
-        observer = specification.first("Observer") if specification else None
+        own = specification.first("CustomIlluminant") if specification else None
+        if own is not None:
+            X, Y, Z = spectra.to_xyz(self._power(own), None, observer).tolist()
+            return (X, Y, Z), ""
         if light is None:
             self._found.note("The file names no illuminant: taken as D50.")
-        degrees = "1964" if observer is not None and observer.content.startswith("10") else "1931"
-        return {"9300": "9300K", "TL84": "FL11"}.get(light.content, light.content) if light else "D50", degrees
+        name = light.content if light else "D50"
+        if light is not None and name in _WITHOUT_SPECTRUM:
+            if not all(axis in light.attributes for axis in "XYZ"):
+                self._found.note(f"Colors under {name} are left out: the file does not say which white that is.")
+                return None
+            X, Y, Z = (self._float(light.attributes[axis], light, "the white") for axis in "XYZ")
+            if min(X, Y, Z) <= 0:
+                raise LineError(self._name, light.line, f"the white of {name} is not above 0", _REMEDY)
+            return (X / Y, 1.0, Z / Y), ""
+        found = spectra.illuminant(_LAMPS.get(name, name))
+        X, Y, Z = colorimetry.white_xyz(found, observer).tolist()
+        return (X, Y, Z), found.name
+
+    def _power(self, node: _Node) -> Spectrum:
+        """Return the light of a node that has its spectral power."""
+        powers = node.first("SPDList")
+        if powers is None:
+            wavelengths, values = self._points(node)
+        else:
+            values = np.array([self._float(text, node, "a value") for text in powers.content.split()])
+            first, step = (
+                self._float(node.attributes.get(key, ""), node, key) for key in ("WLStart", "List_Increment")
+            )
+            wavelengths = first + step * np.arange(len(values), dtype=np.float64)
+        if not spectra.covers(wavelengths) or (np.diff(wavelengths) <= 0).any() or values.min() < 0:
+            raise LineError(self._name, node.line, "the illuminant is no power from 400 to 700 nm", _REMEDY)
+        return Spectrum(wavelengths, values, clean(node.attributes.get("Name", "")) or "the file's own illuminant")
 
 
 _TAGS: dict[str, tuple[str, ...]] = {
     "ReflectanceSpectrum": (),
+    "CustomSpectrum": (),
     "ColorCIELab": ("L", "A", "B"),
     "ColorCIEXYZ": ("X", "Y", "Z"),
     "ColorCIELCh": ("L", "C", "H"),
@@ -231,6 +290,10 @@ _TAGS: dict[str, tuple[str, ...]] = {
     "ColorHTML": (),
     "ColorRGB": ("R", "G", "B"),
 }
+
+# Lamps that the schema has by other names; FL10 to FL12 are those of the same makers in CIE 15:2018, table T.6.
+_LAMPS = {"9300": "9300K", "TL83": "FL12", "TL84": "FL11", "UL30": "FL12", "UL50": "FL10"}
+_WITHOUT_SPECTRUM = ("Custom", "UL35")
 
 # The illuminants that the schema has, by our names.
 _ILLUMINANTS = {name: name for name in ("A", "B", "C", "D50", "D55", "D60", "D65", "D75", "E")} | {

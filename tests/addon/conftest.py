@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dyehouse.batch import files
 from dyehouse.batch import photo as photos
 from dyehouse.core import transfer
-from dyehouse.core.colorspace import space_named
+from dyehouse.core.colorspace import SRGB, space_named
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -113,3 +113,14 @@ class Photos:
 def photo(tmp_path: Path) -> Photos:
     """A maker of photos."""
     return Photos(tmp_path)
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    """A table of two photos, the first in two colorways."""
+    codes = np.full((40, 60, 3), (200, 90, 40), np.uint8)
+    for name in ("a", "b"):
+        files.write(tmp_path / f"{name}.png", codes, files.Photo(Path(), codes, SRGB))
+    path = tmp_path / "catalog.csv"
+    path.write_text("photo,reference,colorways\na.png,30 20,navy=#1F4E79 | red=#A02818\nb.png,30 20,navy=#1F4E79\n")
+    return path

@@ -86,6 +86,12 @@ def test_the_last_two_are_kept(worker: background.Worker[str]) -> None:
     assert [worker.found(key) for key in "bcd"] == ["b", None, "d"]
 
 
+def test_what_is_taken_is_kept_no_longer(worker: background.Worker[str]) -> None:
+    worker.now("key", lambda: lambda: "made")
+    assert worker.take("key") == "made"
+    assert worker.take("key") is None
+
+
 def test_unregistering_drops_everything(worker: background.Worker[str]) -> None:
     worker.now("key", lambda: lambda: "made")
     background.unregister()

@@ -4,22 +4,9 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
 
-from dyehouse.batch import files
 from dyehouse.batch.cli import main
-from dyehouse.core.colorspace import SRGB
-
-
-@pytest.fixture
-def table(tmp_path: Path) -> Path:
-    codes = np.full((40, 60, 3), (200, 90, 40), np.uint8)
-    for name in ("a", "b"):
-        files.write(tmp_path / f"{name}.png", codes, files.Photo(Path(), codes, SRGB))
-    path = tmp_path / "catalog.csv"
-    path.write_text("photo,reference,colorways\na.png,30 20,navy=#1F4E79 | red=#A02818\nb.png,30 20,navy=#1F4E79\n")
-    return path
 
 
 def test_the_same_files_as_the_command_line(extension: ModuleType, table: Path, tmp_path: Path) -> None:

@@ -1,19 +1,14 @@
 """What is chosen in the list of colorways is shown, and what is changed is kept in it."""
 
-from collections.abc import Iterator
-
 import bpy
 import pytest
 
-from dyehouse import addon
 from dyehouse.addon import colorways, recipes
 
 
 @pytest.fixture(autouse=True)
-def settings() -> Iterator[bpy.types.PropertyGroup]:
+def settings(blender: None) -> bpy.types.PropertyGroup:
     """Settings of a photo with two regions and two colorways."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
     made = bpy.data.images.new("photo", 8, 8).dyehouse
     for name in ("Upper", "Sole"):
         made.regions.add().name = name
@@ -24,8 +19,7 @@ def settings() -> Iterator[bpy.types.PropertyGroup]:
         if text:
             made.regions[0].target.text = text
         colorways.keep(made)
-    yield made
-    addon.unregister()
+    return made
 
 
 def shown(settings: bpy.types.PropertyGroup) -> list[object]:

@@ -1,6 +1,5 @@
 """Recoloring renders and images in the compositor, against files and against renders of another material."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dyehouse import addon
 from dyehouse.addon import nodes
 from dyehouse.batch import files
 from dyehouse.batch import photo as photos
@@ -18,18 +16,11 @@ from dyehouse.core.colorspace import LINEAR_SRGB, SRGB
 from dyehouse.core.recipe import Recipe, Region
 from dyehouse.core.swatches import parse_target
 
+pytestmark = pytest.mark.usefixtures("blender")
 HEIGHT, WIDTH = 32, 44
 MATTE = (14, 18)
 TARGET = "lab(42, 55, 35)"
 RED, BLUE = (0.5, 0.06, 0.04), (0.05, 0.15, 0.5)
-
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
-    yield
-    addon.unregister()
 
 
 @pytest.fixture(params=["CPU", "GPU"])

@@ -1,6 +1,5 @@
 """The live node groups give the core's pixels, in Cycles and in the compositor on both devices."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -15,17 +14,10 @@ from dyehouse.benchmarks import node_renders
 from dyehouse.core import dichromatic, mixture
 from dyehouse.core.colorspace import LINEAR_SRGB
 
+pytestmark = pytest.mark.usefixtures("blender")
 HEIGHT, WIDTH = 12, 16
 ENGINES = ("cycles", "compositor CPU", "compositor GPU")
 type Case = dict[str, object]
-
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
-    yield
-    addon.unregister()
 
 
 @pytest.fixture

@@ -34,6 +34,7 @@ def set_up(image: bpy.types.Image, click: tuple[int, int]) -> None:
     settings.light_source, settings.light_illuminant = "ILLUMINANT", "A"
     settings.observer, settings.adaptation = "1964", "bradford"
     settings.output_pattern, settings.quality = "//out/{photo}_{colorway}.jpg", 88
+    settings.output_space = "display-p3"
     bpy.ops.dyehouse.add_colorway(image=image.name, name="one")
     ground.target.used = False
     bpy.ops.dyehouse.add_colorway(image=image.name, name="two")
@@ -59,12 +60,22 @@ def test_every_setting_comes_back(photo: Any, tmp_path: Path) -> None:
 
     image.dyehouse.regions.clear()
     image.dyehouse.colorways.clear()
-    for name in ("white_source", "light_source", "observer", "adaptation", "output_pattern", "quality", "gray"):
+    for name in (
+        "white_source",
+        "light_source",
+        "observer",
+        "adaptation",
+        "output_pattern",
+        "quality",
+        "output_space",
+        "gray",
+    ):
         image.dyehouse.property_unset(name)
     assert bpy.ops.dyehouse.load_recipe(image=image.name, filepath=str(path)) == {"FINISHED"}
     assert recipes.recipe_of(image) == asked
     assert image.dyehouse.regions[0].target.swatch_name == "Violet 7"
     assert (image.dyehouse.output_pattern, image.dyehouse.quality) == ("//out/{photo}_{colorway}.jpg", 88)
+    assert image.dyehouse.output_space == "display-p3"
     assert written(image, tmp_path / "after.png") == before
     assert by_command_line(path, image.filepath, tmp_path / "cli.png") == before
     again = tmp_path / "again.toml"
@@ -124,6 +135,7 @@ def test_a_photo_that_lies_on_its_side(orientation: int, photo: Any, tmp_path: P
     output.close()
     image = bpy.data.images.load(path)
     set_up(image, photo.MATTE)
+    image.dyehouse.output_space = "PHOTO"  # as the new image has it
     upright = files.turned(np.rint(photo.coverage() * 255).astype(np.uint8), orientation)[..., None].repeat(3, axis=2)
     files.write(tmp_path / "mask.png", upright, files.Photo(Path(), upright, files.SRGB))
     ground = image.dyehouse.regions[1]
@@ -171,3 +183,18 @@ def test_a_recipe_opens_its_own_photo(photo: Any, tmp_path: Path) -> None:
     bpy.data.images.remove(image)
     assert bpy.ops.dyehouse.load_recipe(filepath=str(tmp_path / "r.toml")) == {"FINISHED"}
     assert bpy.data.images["8-bit.png"].dyehouse.regions[0].name == "Shirt"
+
+
+def test_measured_lights_beside_the_blend(photo: Any, tmp_path: Path) -> None:
+    image = photo.image()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    (tmp_path / "lamp.csv").write_text("".join(f"{nm}, {nm / 500}\n" for nm in range(380, 781, 10)))
+    bpy.ops.dyehouse.pick_region(image=image.name, pixel=photo.MATTE)
+    image.dyehouse.white_source, image.dyehouse.white_illuminant = "ILLUMINANT", "//lamp.csv"
+    image.dyehouse.light_source, image.dyehouse.light_illuminant = "ILLUMINANT", "//lamp.csv"
+    before = written(image, tmp_path / "ours.png")
+    recipe = tmp_path / "r.toml"
+    bpy.ops.dyehouse.save_recipe(image=image.name, filepath=str(recipe))
+    assert by_command_line(recipe, str(photo.file("8-bit.png")), tmp_path / "cli.png") == before
+    image.dyehouse.white_source = "BALANCED"
+    assert written(image, tmp_path / "other.png") != before

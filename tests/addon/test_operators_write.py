@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from dyehouse.addon import images
-from dyehouse.addon.operators import write
+from dyehouse.addon.operators import modal, write
 from dyehouse.batch import files, verification
 from dyehouse.batch.cli import main
+from dyehouse.core.colorspace import SPACES
 from dyehouse.core.swatches import parse_target
 
 pytestmark = pytest.mark.usefixtures("blender")
@@ -48,6 +49,17 @@ def test_what_is_shown_is_written(image: bpy.types.Image, tmp_path: Path) -> Non
     assert (tmp_path / "low.jpg").read_bytes() == by_command_line(
         image, tmp_path / "cli-low.jpg", "#1F4E79", "--quality", "60"
     )
+
+
+def test_a_wider_color_space_is_written(image: bpy.types.Image, tmp_path: Path) -> None:
+    image.dyehouse.output_space = "rec2020"
+    assert bpy.ops.dyehouse.write_file(image=image.name, filepath=str(tmp_path / "out.png")) == {"FINISHED"}
+    expected = by_command_line(image, tmp_path / "cli.png", TARGET, "--output-space", "rec2020")
+    assert (tmp_path / "out.png").read_bytes() == expected
+    assert files.read(tmp_path / "out.png").space is SPACES["rec2020"]
+    asked = {"click": "22,26", "target": TARGET, "output_space": "rec2020"}
+    bpy.ops.dyehouse.recolor(image=image.name, output=str(tmp_path / "asked.png"), **asked)
+    assert (tmp_path / "asked.png").read_bytes() == expected
 
 
 def test_what_was_written_is_read_back_and_told(image: bpy.types.Image, tmp_path: Path) -> None:
@@ -140,14 +152,14 @@ def test_a_photo_without_target_or_colorway_says_so(photo: Any, tmp_path: Path) 
 
 def test_stopping_leaves_whole_files_and_no_others(image: bpy.types.Image, tmp_path: Path) -> None:
     job = write.all_colorways(image, str(tmp_path / "{colorway}.tif"), overwrite=False, quality=95)
-    assert job.finish(job.recolor_next())
+    assert job.finish(job.work())
     done, total, text = job.progress()
     assert (done, total) == (1, 2)
     assert "violet.tif" in text
     bpy.data.images.remove(image)  # the job does not need it any more
     job.stop()
-    with pytest.raises(write._Stopped):
-        job.recolor_next()
+    with pytest.raises(modal.Stopped):
+        job.work()
     assert files.read(tmp_path / "navy.tif").pixels.shape[2] == 3
     assert [p.name for p in tmp_path.iterdir() if p.suffix == ".tif" or p.name.startswith(".")] == ["navy.tif"]
 
@@ -160,11 +172,11 @@ def test_stopping_within_a_file_leaves_none_of_it(image: bpy.types.Image, tmp_pa
     def watch(share: float) -> None:
         shares.append(share)
         job.stop()
-        job._watch(share)
+        job.watch(share)
 
     job._options["watch"] = watch
     assert look()
-    with pytest.raises(write._Stopped):
-        job.recolor_next()
+    with pytest.raises(modal.Stopped):
+        job.work()
     assert len(shares) == 1
     assert not [p for p in tmp_path.iterdir() if p.suffix == ".tif" or p.name.startswith(".")]

@@ -1,27 +1,19 @@
 """Maps over the picture: the core's numbers in perceptually ordered colors."""
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from dyehouse import addon
 from dyehouse.addon import background, overlays, preview
 from dyehouse.core import gamut, recolor
 from dyehouse.core.colorimetry import linear_to_lab
 from dyehouse.core.colorspace import SRGB
 from dyehouse.core.transfer import decode
 
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
-    yield
-    addon.unregister()
+pytestmark = pytest.mark.usefixtures("blender")
 
 
 @pytest.fixture
@@ -78,7 +70,8 @@ def test_a_map_is_the_numbers_of_the_core(photo: bpy.types.Image, kind: str) -> 
         "ERROR": lambda: analysis.predicted_error(prepared.target(0), prepared.target_white),
     }[kind]()
     colors = made(kind, photo).colors
-    np.testing.assert_allclose(colors[..., :3], overlays.viridis(values / overlays.SCALES[kind].top), atol=1e-5)
+    expected = decode(overlays.viridis(values / overlays.SCALES[kind].top), SRGB.curve)
+    np.testing.assert_allclose(colors[..., :3], expected, atol=1e-5)
     np.testing.assert_allclose(colors[..., 3], analysis.mask / 255, atol=1e-6)
     assert np.ptp(values[analysis.mask > 0]) > 0
 
@@ -95,6 +88,18 @@ def test_out_of_gamut(photo: bpy.types.Image) -> None:
     assert (marked != expected).mean() < 1e-4
     share = np.count_nonzero(expected) / np.count_nonzero(now.look.prepared.analyses[0].mask)
     assert found.words == f"{share:.1%} of the product outside sRGB"
+
+
+def test_out_of_the_gamut_of_the_files(photo: bpy.types.Image) -> None:
+    photo.dyehouse.regions[0].target.text = "color(display-p3 0.0 0.75 0.3)"
+    shares = {}
+    for space in ("PHOTO", "display-p3", "rec2020"):
+        photo.dyehouse.output_space = space
+        settled(photo)
+        shares[space] = float(made("GAMUT", photo).words.split("%")[0])
+    assert shares["PHOTO"] > 20 + shares["display-p3"]
+    assert shares["display-p3"] >= shares["rec2020"]
+    assert made("GAMUT", photo).words.endswith("outside Rec.2020")
 
 
 def test_only_maps_of_the_target_follow_it(photo: bpy.types.Image) -> None:

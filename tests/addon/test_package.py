@@ -105,6 +105,7 @@ module = sys.modules[NAME]
 for _ in range(2):
     module.register()
     module.unregister()
+module.unregister()
 assert not names(), names()
 """,
         package,

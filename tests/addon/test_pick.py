@@ -1,24 +1,16 @@
 """The eyedroppers with a pixel that is given, without a window."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from dyehouse import addon
 from dyehouse.addon import session
 from dyehouse.batch import files
 from dyehouse.core.colorspace import SRGB
 
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
-    yield
-    addon.unregister()
+pytestmark = pytest.mark.usefixtures("blender")
 
 
 @pytest.fixture

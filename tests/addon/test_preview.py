@@ -1,7 +1,6 @@
 """The preview's shader, off screen, against the core; and what the preview makes ready in its thread."""
 
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import gpu
 import numpy as np
 import pytest
 
-from dyehouse import addon
 from dyehouse.addon import background, drawing, preview, session
 from dyehouse.batch import files
 from dyehouse.core import colorspace, gamut, transfer
@@ -19,15 +17,8 @@ from dyehouse.core.layers import Layers, take_apart
 from dyehouse.core.picture import Picture
 from dyehouse.core.recolor import RegionMatrix, recolor
 
+pytestmark = pytest.mark.usefixtures("blender")
 WHOLE = preview.Painting((2, 2, -1, -1), nearest=True)
-
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
-    yield
-    addon.unregister()
 
 
 @pytest.fixture(scope="module")

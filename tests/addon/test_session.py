@@ -82,7 +82,7 @@ def test_another_target_needs_no_other_look_and_another_click_does(image: bpy.ty
     assert not np.allclose(other.prepared.target_white, look.prepared.target_white)
     region.tolerance = 2
     assert session.ready(image) is None
-    assert made(image).photo is look.photo
+    assert made(image).photo.pixels is look.photo.pixels
 
 
 def test_a_painted_mask_is_looked_at_again(image: bpy.types.Image, photo: Any) -> None:
@@ -165,6 +165,48 @@ def test_undo_and_redo_bring_settings_and_looks_back(image: bpy.types.Image) -> 
     image = bpy.data.images[name]
     assert image.dyehouse.regions[0].target.text == "#AA2211"
     assert session.last(image).prepared.analyses[0] is second.prepared.analyses[0]
+
+
+def test_a_region_that_is_not_picked_yet_leaves_the_others(image: bpy.types.Image) -> None:
+    before = made(image)
+    settings = image.dyehouse
+    bpy.ops.dyehouse.add_region(image=image.name, name="Sole")
+    settings.regions.move(1, 0)
+    look = made(image)
+    assert look.regions == (1,)
+    assert look.place(0) is None
+    assert look.place(1) == 0
+    assert look.prepared.analyses[0] is before.prepared.analyses[0]
+    assert tuple(settings.regions[0].found_color) == (0, 0, 0)
+    assert min(settings.regions[1].found_color) > 0
+    with pytest.raises(DyehouseError, match="'Sole' is not picked yet"):
+        session.look(image)
+    settings.regions[0].mask_source = "SPLINE"
+    assert made(image).regions == (1,)
+    settings.regions[0].mask_source = "WHOLE"
+    assert made(image).regions == (0, 1)
+
+
+def test_warnings_are_found_in_a_thread(image: bpy.types.Image) -> None:
+    image.dyehouse.regions[0].mask_source = "WHOLE"  # product and ground
+    assert session.warnings(image, None) == ()  # the photo has not been looked at
+    look = made(image)
+    assert session.warnings(image, look) == ()
+    settled()
+    assert session.warnings(image, look) == tuple(look.prepared.warnings)
+    assert look.prepared.warnings
+
+
+def test_many_pixels_in_memory_are_looked_at_without_waiting(
+    image: bpy.types.Image, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image.pixels.foreach_set(np.array(image.pixels[:], np.float32))  # now they are not those of the file
+    monkeypatch.setattr(images, "_FEW", 0)
+    assert images.version_of(image, hurry=True) is None
+    assert session.ready(image) is None
+    settled()
+    assert images.version_of(image, hurry=True) == images.version_of(image)
+    assert (made(image).photo.pixels == images.photo_of(image).pixels).all()
 
 
 def test_few_looks_are_kept(image: bpy.types.Image, photo: Any) -> None:

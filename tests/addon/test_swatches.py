@@ -1,13 +1,11 @@
 """The swatch book in Blender: targets from swatches, favorites, files, palettes."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from dyehouse import addon
 from dyehouse.addon import recipes, swatches
 from dyehouse.core import swatch_files
 from dyehouse.core.colorspace import SRGB
@@ -16,16 +14,13 @@ from dyehouse.core.swatches import Swatch, parse_target
 
 
 @pytest.fixture(autouse=True)
-def image(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[bpy.types.Image]:
+def image(blender: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> bpy.types.Image:
     """An image of two regions, and a swatch book in an empty folder."""
     monkeypatch.setattr(swatches, "folder", lambda: str(tmp_path / "swatches"))
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
     made = bpy.data.images.new("photo", 8, 8)
     for name in ("Upper", "Sole"):
         made.dyehouse.regions.add().name = name
-    yield made
-    addon.unregister()
+    return made
 
 
 def target(image: bpy.types.Image, index: int = 0):
@@ -108,6 +103,26 @@ def test_palettes_come_in_and_go_out(image: bpy.types.Image) -> None:
     assert bpy.ops.dyehouse.swatches_to_palette(library="Autumn") == {"FINISHED"}
     made = bpy.data.palettes["Autumn.001"]
     assert np.allclose([entry.color for entry in made.colors], colors, atol=1e-6)
+    palette.colors[0].color = (1, 1, 1)
+    assert bpy.ops.dyehouse.swatches_from_palette(palette="Autumn") == {"FINISHED"}
+    assert np.allclose(swatches.book().library("Autumn").linear_colors, colors, atol=1e-6)  # is left as it was
+    assert np.allclose(swatches.book().library("Autumn 2").linear_colors[0], 1, atol=1e-6)
+
+
+def test_a_folder_comes_in_as_one_library(image: bpy.types.Image, tmp_path: Path) -> None:
+    folder = tmp_path / "Season 26"
+    folder.mkdir()
+    made = {"warm": [Swatch.from_srgb((k / 9, 0.2, 0.1), f"W{k}") for k in range(4)]}
+    made["cold"] = [Swatch.from_lab((k * 10, 5, -40), "D65", "1964", f"C{k}") for k in range(3)]
+    swatch_files.write(folder / "warm.ase", Library.of("warm", made["warm"]))
+    swatch_files.write(folder / "cold.cxf", Library.of("cold", made["cold"]))
+    assert bpy.ops.dyehouse.import_swatches(filepath=f"{folder}/") == {"FINISHED"}
+    library = swatches.book().library("Season 26")
+    assert set(library.group_names) == {"warm.ase", "cold.cxf"}
+    assert {s.text for s in library.swatches} == {s.text for some in made.values() for s in some}
+    assert library.named("C2").color.observer == "1964"
+    with pytest.raises(RuntimeError, match=r"has 'Season 26\.csv' already"):
+        bpy.ops.dyehouse.import_swatches(filepath=f"{folder}/")
 
 
 @pytest.mark.parametrize(

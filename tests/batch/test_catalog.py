@@ -538,12 +538,14 @@ def test_a_worker_killed_midway_is_replaced(tmp_path, product):
 
 @pytest.mark.slow
 def test_killed_at_twenty_moments_and_resumed(tmp_path, product):
-    table = catalog(tmp_path / "shop", product, 10, size=160)
+    table = catalog(tmp_path / "shop", product, 10, size=500)
     whole, out = tmp_path / "whole", tmp_path / "out"
     begun = time.perf_counter()
-    assert finish(started(table, whole, "--workers", "2"))[0] == 0
-    length = time.perf_counter() - begun
-    moments = np.random.default_rng(7).uniform(0.2, 1.0, 20) * length
+    undisturbed = started(table, whole, "--workers", "2")
+    undisturbed.stdout.readline()
+    first = time.perf_counter() - begun
+    assert finish(undisturbed)[0] == 0
+    moments = np.random.default_rng(7).uniform(0.8 * first, time.perf_counter() - begun, 20)
     killed = []
     for moment in moments:
         shutil.rmtree(out, ignore_errors=True)

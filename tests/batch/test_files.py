@@ -846,3 +846,20 @@ def test_turning_and_back(orientation: int) -> None:
         there = files.turned_point((x, y), picture.shape, orientation)
         assert upright[there[1], there[0]] == picture[y, x]
         assert files.turned_point(there, upright.shape, orientation, back=True) == (x, y)
+
+
+@pytest.mark.parametrize("suffix", sorted(files.OUTPUT_KINDS))
+@pytest.mark.parametrize("rows", [1, 33, 70, 500])
+def test_some_rows_from_the_top(tmp_path, suffix, rows):
+    y, x = np.mgrid[:70, :50]
+    codes = np.stack([3 * y, 4 * x, (x + y)], axis=-1).astype(np.uint8)
+    path = tmp_path / f"picture{suffix}"
+    files.write(path, codes, files.Photo(tmp_path, codes, files.SRGB))
+    np.testing.assert_array_equal(files.read(path, rows=rows).pixels, files.read(path).pixels[:rows])
+
+
+def test_some_rows_of_a_turned_photo_are_all_of_it(tmp_path):
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    Image.new("RGB", (40, 20), (200, 10, 10)).save(tmp_path / "turned.jpg", exif=exif)
+    assert files.read(tmp_path / "turned.jpg", rows=5).pixels.shape == (40, 20, 3)

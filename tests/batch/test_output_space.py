@@ -99,3 +99,33 @@ def test_command_line(tmp_path, source, capsys):
     capsys.readouterr()
     assert main([*common, "--output-space", "moon", "--force"]) == 2
     assert "'moon' is not known" in capsys.readouterr().err
+
+
+def test_a_catalog_writes_each_result_in_its_own_space(source, tmp_path):
+    source("codes")
+    (tmp_path / "p3.toml").write_text('[[region]]\nreference = [60, 60]\n[output]\noutput_space = "display-p3"\n')
+    (tmp_path / "t.csv").write_text(
+        "photo,recipe,reference,target,output_space,output\n"
+        "in.png,,60 60,#1F8E59,rec2020,wide.png\nin.png,p3.toml,,#1F8E59,,p3.png\nin.png,,60 60,#1F8E59,,own.png\n"
+    )
+    assert main(["batch", str(tmp_path / "t.csv"), "--out", str(tmp_path / "out"), "--workers", "0", "--quiet"]) == 0
+    asked = ["recolor", str(tmp_path / "in.png"), "--reference", "60,60", "--target", "#1F8E59"]
+    for name, options in (
+        ("wide", ["--output-space", "rec2020"]),
+        ("p3", ["--output-space", "display-p3"]),
+        ("own", []),
+    ):
+        assert main([*asked, *options, "-o", str(tmp_path / f"{name}.png")]) == 0
+        assert (tmp_path / "out" / f"{name}.png").read_bytes() == (tmp_path / f"{name}.png").read_bytes(), name
+    assert main([*asked[:2], "--recipe", str(tmp_path / "p3.toml"), "-o", str(tmp_path / "again.png")]) == 2
+    (tmp_path / "p3.toml").write_text(
+        '[[region]]\nreference = [60, 60]\ntarget = "#1F8E59"\n[output]\noutput_space = "display-p3"\n'
+    )
+    assert main([*asked[:2], "--recipe", str(tmp_path / "p3.toml"), "-o", str(tmp_path / "again.png")]) == 0
+    assert (tmp_path / "again.png").read_bytes() == (tmp_path / "p3.png").read_bytes()
+
+
+def test_a_catalog_says_what_space_is_not_known(tmp_path, capsys):
+    (tmp_path / "t.csv").write_text("photo,click,target,output_space\nin.png,1 1,#000,wide\n")
+    assert main(["batch", str(tmp_path / "t.csv"), "--out", str(tmp_path / "out"), "--check"]) == 2
+    assert "column 'output_space'" in capsys.readouterr().err

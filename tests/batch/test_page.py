@@ -11,7 +11,7 @@ from dyehouse.batch.cli import main
 from dyehouse.batch.page import run_page, worst_first
 from dyehouse.batch.sheet import GAP
 
-from .catalogs import catalog
+from .catalogs import catalog, journal_of
 from .chromium import PROGRAM, Chromium
 
 
@@ -42,19 +42,27 @@ def test_the_worst_come_first():
         *(entry("a", "done", 1.0), entry("b", "done", 3.0), entry("c", "needs a person", 0.5), entry("d", "done", 1.0)),
         *(entry("e", "done", 1.0, ["x"]), {"output": "f", "status": "failed"}, {"output": "s", "status": "sheet"}),
     ]
-    assert [e["output"] for e in worst_first(made)] == ["f", "c", "b", "e", "a", "d"]
+    assert worst_first({e["output"]: e for e in made}, [e["output"] for e in made]) == ["f", "c", "b", "e", "a", "d"]
 
 
 def test_only_the_worst_have_pictures(out):
     from dyehouse.batch.journal import Journal
 
     journal = Journal(out / "dyehouse-journal.jsonl")
-    journal.close()
-    text = run_page(journal.entries, str(out), most=1)
+    text = run_page(journal, list(journal), str(out), most=1)
     assert text.count("data:image/jpeg;base64,") == 1
     assert text.count("<article") == 5
     (out / "sheets" / "ball0.jpg").unlink()
-    assert run_page(journal.entries, str(out)).count("data:image/jpeg;base64,") == 1
+    assert run_page(journal, list(journal), str(out)).count("data:image/jpeg;base64,") == 1
+    journal.close()
+
+
+def test_it_tells_what_was_delivered(out):
+    text = (out / "index.html").read_text()
+    for entry in journal_of(out):
+        for check in entry.get("verification", ()):
+            assert f"delivered {check['ciede2000']:.2f} from {check['target']}" in text
+    assert text.count("; delivered ") == 4
 
 
 @pytest.fixture

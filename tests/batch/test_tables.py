@@ -245,3 +245,16 @@ def test_a_table_that_is_a_folder(tmp_path):
     _, problems = gather([str(tmp_path / "x.csv")])
     assert "cannot be read" in str(problems[0])
     assert not isinstance(problems[0], DyehouseError)
+
+
+def test_a_measured_light_is_relative_to_its_table_and_an_input(ask, tmp_path):
+    lamp = "".join(f"{nm}, {nm / 500}\n" for nm in range(380, 781, 10))
+    rows = (
+        "photo,click,target,white,illuminant\na.png,10 20,#fff,lamp.csv,0.5 A + 0.5 D65\nb.png,10 20,#fff,gone.csv,A\n"
+    )
+    jobs, problems = ask(lamp__csv=lamp, t__csv=rows)
+    assert jobs[0].recipe.white == str(tmp_path / "lamp.csv")
+    assert jobs[0].recipe.illuminant == "0.5 A + 0.5 D65"
+    assert jobs[0].inputs == [str(tmp_path / "a.png"), str(tmp_path / "lamp.csv")]
+    assert len(problems) == 1
+    assert re.search(r"row 3, column 'white'.*gone\.csv.*cannot be read", problems[0]), problems

@@ -108,7 +108,7 @@ def test_every_region_by_its_own_pixels(product, opened, tmp_path):
     regions = (Region(NAVY, mask=scene.mask, reference=scene.matte), Region(TEAL, mask=left))
     prepared = photo.look(source, Recipe(regions))
     expected = verification.expect(source, prepared, [None, NAVY])
-    for area in expected.areas[:1]:
+    for area, _, _ in expected.asked[:1]:
         assert (left[area.rows, area.columns] == 0).all()  # what lies under the second region is not looked at
     written, _ = photo.save(source, prepared, tmp_path / "out.png", [None, NAVY])
     found = expected.check(written)
@@ -135,7 +135,7 @@ def test_transparent_pixels_are_left_out(product, opened, tmp_path, name):
     source = opened(scene, alpha=alpha)
     prepared = photo.look(source, Recipe((Region(TEAL, mask=scene.mask),)))
     expected = verification.expect(source, prepared)
-    assert (expected.areas[0].columns < 100).all()
+    assert (expected.asked[0][0].columns < 100).all()
     written, _ = photo.save(source, prepared, tmp_path / name)
     (found,) = expected.check(written)
     assert found.ciede2000 < 0.3
@@ -164,3 +164,11 @@ def test_the_journal_of_a_catalog_tells_what_was_delivered(tmp_path, product):
     delivered = [check for entry in entries for check in entry.get("verification", [])]
     assert {check["target"] for check in delivered} == {"#1F4E79", "#2E6B3A"}
     assert all(check["ciede2000"] < 1 for check in delivered)
+
+
+def test_a_catalog_that_verifies_nothing(tmp_path, product):
+    table = catalog(tmp_path / "shop", product, count=1)
+    out = tmp_path / "out"
+    assert main(["batch", str(table), "--out", str(out), "--workers", "0", "--quiet", "--no-verify"]) == 0
+    assert [entry["verification"] for entry in journal_of(out) if entry["status"] == "done"] == [[], []]
+    assert "delivered" not in (out / "index.html").read_text()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dyehouse.core import analyze, transfer
-from dyehouse.core.compositing import refine_outline, spill_weights
+from dyehouse.core.compositing import refine_outline, rim_left_out, spill_weights
 from dyehouse.core.neighborhood import dilate, erode
 from dyehouse.core.picture import Picture
 from dyehouse.core.recolor import RegionMatrix, recolor
@@ -101,6 +101,18 @@ def test_a_mask_that_is_a_few_pixels_wrong(composite, ground, wrong):
     # Without leave to recolor outside the mask, nothing there changes.
     kept = analyze(photo, None, BODY, hard, "dichromatic").recolor(TARGET)
     np.testing.assert_array_equal(kept[~hard], photo[~hard])
+
+
+@pytest.mark.parametrize("ground", [GROUND, np.full(3, 0.3)])
+def test_the_width_of_a_rim_that_the_mask_leaves_out(composite, ground):
+    _, cover, product, _ = composite
+    picture = Picture((cover[..., None] * product + (1 - cover[..., None]) * ground).astype(np.float32))
+    widths = [
+        rim_left_out(picture, erode(cover > 0.5, wrong).astype(np.float32), BODY, np.ones(3)) for wrong in (0, 1, 2)
+    ]
+    np.testing.assert_allclose(np.diff(widths), 1, atol=0.2)
+    assert rim_left_out(picture, cover, BODY, np.ones(3)) < 0.2
+    assert rim_left_out(picture, np.ones(cover.shape), BODY, np.ones(3)) == 0
 
 
 def test_a_mask_through_the_middle_of_a_product_is_meant_so(composite):

@@ -91,6 +91,27 @@ def test_clipped_highlights_are_restored_from_their_channels_and_their_neighbors
     assert error < 0.6 * before
 
 
+@pytest.mark.parametrize("model", ["metal", "bounce"])
+def test_clipped_highlights_of_metal_have_its_own_color(model):
+    y, x = np.mgrid[:80, :80] / 79
+    light = (0.4 + 0.3 * x)[..., None] + 2.0 * np.exp(-(((x - 0.5) / 0.1) ** 2 + ((y - 0.5) / 0.1) ** 2))[..., None]
+    copper = np.array([0.72, 0.3, 0.16])
+    photo = np.minimum(light * copper, 1).astype(np.float32)
+    region = Region(
+        Picture(photo),
+        None,
+        mixture.metal(copper, WHITE) if model == "metal" else mixture.mapped("bounce", copper, WHITE, 1.1),
+        QUIET,
+        clipped=True,
+        shines=False,
+    )
+    final = with_corrections(region.mixture, clipped=True)
+    made = np.concatenate([photo, corrections(region)], axis=2) @ final.matrix(TARGET, WHITE, 0.0).T
+    one = (photo >= 1).sum(axis=2) == 1
+    assert one.sum() > 100
+    np.testing.assert_allclose(made[one], (light * TARGET)[one], atol=0.02)
+
+
 def test_a_photo_without_clipping_has_no_corrections():
     full, *_ = overexposed(np.array([0.75, 0.2, 0.03]), strength=0.1)
     for picture in (full, Picture(transfer.encode(full, transfer.SRGB, np.uint8), transfer.SRGB)):
@@ -109,7 +130,7 @@ def test_a_photo_without_clipping_has_no_corrections():
         (mixture.mapped("bounce", PALE, WHITE, 0.5), 3),
         (mixture.mapped("bounce", PALE, WHITE, 0.5, gloss=False), 3),
         (mixture.two_lights(PALE, WHITE, np.array([1.5, 1, 0.5])), 2),
-        (mixture.metal(PALE, WHITE), 0),
+        (mixture.metal(PALE, WHITE), 3),
     ],
 )
 def test_restoring_adds_columns_and_fits_what_is_known(model, extras):

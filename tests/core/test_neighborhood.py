@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import ndimage
 
-from dyehouse.core.neighborhood import dilate, erode, mean_nearby
+from dyehouse.core.neighborhood import dilate, erode, mean_at, window
 from dyehouse.core.picture import Picture
 
 masks = arrays(bool, st.tuples(st.integers(1, 24), st.integers(1, 24)))
@@ -29,7 +29,7 @@ def test_mean_of_the_wanted_pixels(radius: int) -> None:
     image = rng.random((30, 40, 3), dtype=np.float32)
     wanted = rng.random((30, 40)) < 0.3
     rows, columns = np.nonzero(rng.random((30, 40)) < 0.2)
-    mean, found = mean_nearby(Picture(image), wanted, rows, columns, radius)
+    mean, found = mean_at(Picture(image), wanted, rows, columns, [window(radius)])
     for k, (y, x) in enumerate(zip(rows, columns, strict=True)):
         part = (slice(max(0, y - radius), y + radius + 1), slice(max(0, x - radius), x + radius + 1))
         inside = image[part][wanted[part]]
@@ -38,17 +38,18 @@ def test_mean_of_the_wanted_pixels(radius: int) -> None:
         assert mean[k] == pytest.approx(expected, abs=1e-6)
 
 
-def test_only_given_rows_count() -> None:
-    image = np.zeros((20, 5, 3), np.float32)
-    image[10:] = 1
-    wanted = np.ones((10, 5), bool)
-    mean, found = mean_nearby(Picture(image), wanted, np.array([10]), np.array([2]), 3, top=10)
-    assert found[0]
-    assert mean[0] == pytest.approx([1, 1, 1])
-
-
 def test_a_wide_window_is_sampled_and_still_the_mean() -> None:
     image = np.full((200, 200, 3), (0.2, 0.4, 0.6), np.float32)
-    mean, found = mean_nearby(Picture(image), np.ones((200, 200), bool), np.array([100]), np.array([100]), 60)
+    mean, found = mean_at(Picture(image), np.ones((200, 200), bool), np.array([100]), np.array([100]), [window(60)])
     assert found[0]
     assert mean[0] == pytest.approx([0.2, 0.4, 0.6], abs=1e-6)
+
+
+def test_the_first_group_with_a_wanted_pixel_counts() -> None:
+    image = np.zeros((9, 9, 3), np.float32)
+    image[4, 6], image[4, 8] = 1, 5
+    wanted = image[..., 0] > 0
+    groups = [np.array([[0, 1], [1, 0]]), np.array([[0, 2]]), np.array([[0, 4]])]
+    mean, found = mean_at(Picture(image), wanted, np.array([4, 0]), np.array([4, 8]), groups)
+    assert found.tolist() == [True, False]
+    assert mean.tolist() == [[1, 1, 1], [0, 0, 0]]

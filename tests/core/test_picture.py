@@ -5,7 +5,7 @@ import pytest
 
 from dyehouse.core import transfer
 from dyehouse.core.errors import ImageError, MaskError
-from dyehouse.core.picture import Picture, as_mask, as_weights, bands, strips
+from dyehouse.core.picture import Picture, above, as_mask, as_weights, bands, block_means, strips
 
 RNG = np.random.default_rng(0)
 CODES = RNG.integers(0, 256, (9, 11, 4), np.uint8)
@@ -142,3 +142,21 @@ def test_half_coverage():
 def test_bad_masks(mask, words):
     with pytest.raises(MaskError, match=words):
         as_mask(mask, (6, 7))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("level", [0.004, 0.5, 0.95, 0.996])
+def test_above_is_what_the_weights_say(dtype, level):
+    top = np.iinfo(dtype).max if np.dtype(dtype).kind == "u" else 1
+    mask = (np.linspace(0, 1, 1000) * top).astype(dtype).reshape(8, 125)
+    expected = mask.astype(np.float64) / top > level
+    np.testing.assert_array_equal(above(mask, level), expected)
+
+
+@pytest.mark.parametrize("step", [1, 2, 5, 7])
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+def test_block_means(step, dtype):
+    values = np.random.default_rng(1).random((37, 23, 2)).astype(dtype)
+    rows, columns = 37 // step, 23 // step
+    whole = values[: rows * step, : columns * step].astype(np.float64).reshape(rows, step, columns, step, 2)
+    np.testing.assert_allclose(block_means(values, step), whole.mean(axis=(1, 3)), atol=1e-6)

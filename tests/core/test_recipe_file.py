@@ -198,12 +198,14 @@ def test_paths_follow_the_file(tmp_path):
     teal = parse_target("teal.csv", tmp_path)
     region = Region(teal, mask="masks/a.png", source=parse_target("#fff"))
     alpha = Region(mask="alpha", name="b")
-    recipe = Recipe((region, alpha), camera="camera.csv")
+    (tmp_path / "lamp.csv").write_text("".join(f"{w}, {w}\n" for w in range(400, 701, 20)))
+    recipe = Recipe((region, alpha), camera="camera.csv", white="lamp.csv", illuminant="0.5 A + 0.5 D65")
     stored = StoredRecipe(recipe, "photos/a.jpg", folder=tmp_path)
     placed = stored.located()
     assert placed.regions[0].mask == str(tmp_path / "masks" / "a.png")
     assert placed.regions[1].mask == "alpha"
     assert placed.camera == str(camera)
+    assert (placed.white, placed.illuminant) == (str(tmp_path / "lamp.csv"), "0.5 A + 0.5 D65")
 
     written_to = write_recipe(tmp_path / "recipes" / "a.toml", stored)
     again = read_recipe(written_to)

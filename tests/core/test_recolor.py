@@ -373,6 +373,14 @@ def test_bad_pixels_are_refused(bad, dtype):
             recolor(Picture(image), regions, curve=transfer.SRGB, dtype=dtype)
 
 
+def test_a_converted_picture_is_not_changed():
+    image = RNG.random((30, 40, 3), dtype=np.float32)
+    before = image.copy()
+    result, _ = recolor(Picture(image), [RegionMatrix(M1)], convert=M2)
+    np.testing.assert_array_equal(image, before)
+    np.testing.assert_allclose(result, image @ M1.T @ M2.T, atol=1e-5)
+
+
 def test_huge_ordinary_numbers_are_no_error():
     image = np.full((4, 5, 3), 1e25, np.float32)
     result, _ = recolor(Picture(image), [RegionMatrix(M1)])

@@ -160,6 +160,28 @@ def test_trimmed_mean_stays_among_the_pixels_and_ignores_specks(pixels, seed):
     np.testing.assert_allclose(r.trimmed_mean(specks), 0.5, atol=1e-12)
 
 
+def test_steady_mean_by_hand():
+    # Median (0, 0, 0); half of the distances are up to 0.1: up to 0.8 of that they count in full, at twice it no more.
+    values = np.array([-9, -5, -0.1, -0.1, -0.01, 0, 0.01, 0.1, 0.1, 4, 8.0])
+    pixels = np.column_stack([values, np.zeros(11), np.zeros(11)])
+    np.testing.assert_allclose(r.steady_mean(pixels), [0, 0, 0], atol=1e-12)
+    pixels[4:7, 1] = 0.06
+    near = 2 - 0.1 / (0.8 * 0.1)
+    np.testing.assert_allclose(r.steady_mean(pixels)[1], 0.06 * 3 / (3 + 4 * near), rtol=1e-6)
+    np.testing.assert_allclose(r.steady_mean(np.array([[1, 2, 3.0]])), [1, 2, 3])
+
+
+def test_texture_is_read_alike_in_two_colors():
+    # Yarn of different brightness with gloss between: the same pixels must count in both photos.
+    rng = np.random.default_rng(0)
+    shading, gloss = rng.uniform(0.6, 1, (200, 9, 1)), rng.uniform(0, 0.02, (200, 9, 1))
+    bodies = np.array([0.04, 0.05, 0.31]), np.array([0.43, 0.04, 0.05])
+    read = [np.array([r.steady_mean(window) for window in shading * body + gloss]) for body in bodies]
+    terms = [np.linalg.pinv(np.column_stack([body, np.ones(3)])) for body in bodies]
+    found = [colors @ split.T for colors, split in zip(read, terms, strict=True)]
+    assert np.abs(found[0] - found[1])[:, 0].mean() < 0.01
+
+
 # --- the white ------------------------------------------------------------------------------------------------
 
 

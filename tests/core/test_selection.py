@@ -1,14 +1,17 @@
 """Which model a region gets, and what must hold whatever it is."""
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dyehouse.core import analyze, mixture
+from dyehouse.core import analyze, mixture, transfer
 from dyehouse.core.interreflection import bounced
 from dyehouse.core.picture import Picture
-from dyehouse.core.selection import choose, noise_across
+from dyehouse.core.selection import choose, noise_across, steadied
+from dyehouse.core.stability import Noise
 
 WHITE = np.ones(3)
 RED, PALE = np.array([0.43, 0.06, 0.1]), np.array([0.6, 0.45, 0.42])
@@ -84,6 +87,72 @@ def test_texture_of_two_colors_is_no_noise():
     mask[:, 60:] = 1
     noise = noise_across(Picture(photo), RED, WHITE)
     assert noise.at(np.array(0.4)) < 0.006
+
+
+def rounded(codes):
+    return Picture(np.clip(np.round(codes), 0, 255).astype(np.uint8), transfer.SRGB)
+
+
+def test_rounding_to_codes_is_noise_and_what_compression_leaves_is_more():
+    smooth = scene(RED, size=128)
+    codes = 255 * transfer.SRGB.encode(smooth)
+    # Blocks of 8 x 8 that keep no more than their mean, as a JPEG leaves of smooth colors.
+    blocks = codes.reshape(16, 8, 16, 8, 3).mean(axis=(1, 3)).repeat(8, axis=0).repeat(8, axis=1)
+    blocks += np.random.default_rng(0).choice([-1, 1], (16, 16, 1)).repeat(8, axis=0).repeat(8, axis=1)
+    light = np.array(0.4)
+    exact, stepped, flat = (
+        noise_across(p, RED, WHITE).at(light) for p in (Picture(smooth), rounded(codes), rounded(blocks))
+    )
+    step = float(np.mean(np.diff(transfer.SRGB.decode(np.array([118.0, 119.0]) / 255))))
+    assert exact < 1e-4
+    assert 0.2 * step < stepped < 1.5 * step
+    assert flat > 1.5 * stepped
+
+
+def test_a_ground_of_one_code_is_no_compression():
+    codes = 255 * transfer.SRGB.encode(scene(RED, size=128, noise=0.004))
+    cut_out = np.concatenate([codes, np.full((128, 256, 3), 240.0)], axis=1)
+    plain, with_ground = (noise_across(rounded(c), RED, WHITE).at(np.array(0.4)) for c in (codes, cut_out))
+    assert with_ground == pytest.approx(plain, rel=0.2)
+
+
+def test_noise_is_averaged_out_of_the_body_color_and_texture_is_not():
+    rng = np.random.default_rng(1)
+    noise = Noise(0.02, 0.0)
+    flat = np.tile(0.7 * RED, (31, 31, 1)) + rng.normal(0, 0.02, (31, 31, 3))
+    fibers = flat + 0.15 * (rng.random((31, 31, 1)) < 0.4)
+    read = 0.7 * RED + [0.0, 0.012, -0.008]
+    for photo, averaged in ((flat, True), (fibers, False)):
+        steady, left = steadied(Picture(photo.astype(np.float32)), read, WHITE, None, (15, 15), noise)
+        assert (np.abs(steady - 0.7 * RED).max() < 0.008) == averaged
+        assert (left < 0.02 / np.linalg.norm(read) / 4) == averaged
+        assert np.linalg.norm(steady - read) < 0.012 or averaged
+
+
+def test_a_second_light_under_much_noise_is_not_modelled_but_flagged():
+    photo = scene(RED, gloss=0.4, second=0.6, noise=0.03, size=160)
+    analysis = analyze(photo, WHITE, photo[1:4, 70:90].mean(axis=(0, 1)).astype(float))
+    assert analysis.model == "regularized"
+    assert analysis.evidence.hidden
+    assert analysis.predicted(TARGET).flagged
+    one_light = analyze(scene(RED, gloss=0.4, noise=0.03, size=160), WHITE, 0.8 * RED)
+    assert not one_light.evidence.hidden
+
+
+@pytest.mark.slow
+def test_looking_costs_little_beside_one_recolor():
+    photo = np.tile(scene(RED, gloss=0.4, noise=0.002, size=200), (10, 10, 1))
+    ratios = []
+    for _ in range(9):
+        spent = []
+        for model in ("dichromatic", "auto"):
+            start = time.perf_counter()
+            analysis = analyze(photo, WHITE, RED, None, model)
+            analysis.recolor(TARGET)
+            spent.append(time.perf_counter() - start)
+        ratios.append(spent[1] / spent[0])
+    assert analysis.model == "dichromatic"
+    assert np.median(ratios) <= 1.5
 
 
 # --- what must hold for every model ---------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """The book: what is built in, what the user adds, and what is remembered."""
 
 import json
+import struct
 import subprocess
 import sys
 
@@ -156,3 +157,13 @@ assert len(book.library("ColorChecker")) == 24
 assert spectra._tables.cache_info().currsize == 1
 """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_cmyk_is_kept_as_the_color_that_its_printer_makes_of_it(tmp_path):
+    source = tmp_path / "press.aco"
+    source.write_bytes(b"\0\1\0\1" + b"\0\2" + struct.pack(">4H", 0, 32767, 65535, 65535))
+    book = Book(tmp_path / "book")
+    with pytest.raises(FileError, match="CMYK"):
+        book.import_file(source)
+    book.import_file(source, lambda inks: np.array([[50.0, 40.0, -20.0]]))
+    np.testing.assert_allclose(Book(tmp_path / "book").library("press").lab, [[50, 40, -20]], atol=1e-6)

@@ -24,7 +24,7 @@ PRINTED_ERROR = re.compile(r"^(Traceback \(most recent|Error: Python|.*Python sc
 OUTCOME = re.compile(r"^gui: begin (\w+)$(.*?)^gui: (passed|failed) \1$(.*?)(?=^gui: |\Z)", re.MULTILINE | re.DOTALL)
 
 
-def _find() -> Path | str:
+def find_blender() -> Path | str:
     """The `blender` command, or why there is none."""
     cache = (
         Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dyehouse" / "blender" / "bin" / "blender"
@@ -75,13 +75,13 @@ class Blender:
     def environment(self) -> dict[str, str]:
         """Variables under which Blender reads and writes nothing of the user's."""
         kept = {k: v for k, v in os.environ.items() if k != "DISPLAY"}  # never a window on the user's own display
-        folders = (
-            f"{self.seen}:{HERE}:{os.environ.get('DYEHOUSE_SCREENSHOTS', '')}:{os.environ.get('BLENDER_BIND', '')}"
-        )
+        wanted = os.environ.get("DYEHOUSE_SCREENSHOTS")
+        pictures = str(Path(wanted).resolve()) if wanted else ""
         return kept | {
             "BLENDER_USER_RESOURCES": str(self.profile),
             "BLENDER_HOME": str(self.home),
-            "BLENDER_BIND": folders,
+            "BLENDER_BIND": f"{self.seen}:{HERE}:{pictures}:{os.environ.get('BLENDER_BIND', '')}",
+            "DYEHOUSE_SCREENSHOTS": pictures,
         }
 
     def python(self, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -158,7 +158,7 @@ class Blender:
 @pytest.fixture(scope="session")
 def command() -> Path:
     """Blender's command; without one, skip."""
-    found = _find()
+    found = find_blender()
     if isinstance(found, str):
         pytest.skip(f"NOT TESTED IN A REAL BLENDER: {found}")
     return found
@@ -201,22 +201,42 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize(("name", "scenario"), found)
 
 
+type OutcomeOf = Callable[[str, str], Outcome]
+
+
 @pytest.fixture(scope="session")
 def outcome_of(
     blender: Blender, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, coffee_file: Path
-) -> Callable[[str, str], Outcome]:
+) -> OutcomeOf:
     """A function from a file's and a scenario's name to what it left, having passed.
 
     All scenarios of the file that this session asks for run once, in one window.
     """
+    params = [getattr(item, "callspec", None) and item.callspec.params for item in request.session.items]
+    asked = [(p["name"], p["scenario"]) for p in params if p and "scenario" in p]
+    return _runner(blender, asked, tmp_path_factory, coffee_file)
+
+
+@pytest.fixture(scope="session")
+def outcome_without_openimageio(
+    bare_blender: Blender, tmp_path_factory: pytest.TempPathFactory, coffee_file: Path
+) -> OutcomeOf:
+    """The same in a Blender without the OpenImageIO module, one scenario after the other."""
+    return _runner(bare_blender, [], tmp_path_factory, coffee_file)
+
+
+def _runner(
+    blender: Blender,
+    asked: list[tuple[str, str]],
+    tmp_path_factory: pytest.TempPathFactory,
+    coffee_file: Path,
+) -> OutcomeOf:
     outcomes: dict[tuple[str, str], Outcome] = {}
 
     def run(name: str, scenario: str) -> Outcome:
         if (name, scenario) not in outcomes:
             file = SCENARIOS / f"{name}.py"
-            params = [getattr(item, "callspec", None) and item.callspec.params for item in request.session.items]
-            asked = {p["scenario"] for p in params if p and p.get("name") == name}
-            batch = [other for other in names(file) if other in asked | {scenario}]
+            batch = [other for other in names(file) if (name, other) in asked or other == scenario]
             folder = tmp_path_factory.mktemp(name)
             shutil.copy(coffee_file, folder / "photo.png")
             outcomes.update(dict.fromkeys([(name, other) for other in batch], blender.window(file, batch, folder)))

@@ -27,7 +27,7 @@ import sys
 import threading
 import traceback
 from pathlib import Path
-from time import monotonic
+from time import monotonic, thread_time
 
 import bpy
 import numpy as np
@@ -200,6 +200,14 @@ def sidebar(area, tab):
         yield redrawn
 
 
+def open_panel(name):
+    """Have a panel drawn opened, by the name of its class, that is closed at first; before the sidebar is opened."""
+    cls = getattr(bpy.types, name)
+    bpy.utils.unregister_class(cls)
+    cls.bl_options = set()
+    bpy.utils.register_class(cls)
+
+
 def call(window, area, region, operator, *arguments, **properties):
     """Call an operator as if the mouse were in that region."""
     with bpy.context.temp_override(window=window, area=area, region=region):
@@ -285,7 +293,7 @@ def redo():
         return bpy.ops.ed.redo()
 
 
-# --- buttons of the sidebar ---
+# --- buttons of the sidebar, and of the Properties editor ---
 
 
 def find(area, name, across=0.6):
@@ -294,13 +302,13 @@ def find(area, name, across=0.6):
     `name` is an operator's id ("dyehouse.pick_white") or how the path of a property ends ("white_source"); `across` is
     how far from the sidebar's left edge to look, 0 to 1.
     """
-    ui = region_of(area, "UI")
+    ui = _buttons(area)
     x = ui.x + ui.width * across
     remembered = _found.get((area.ui_type, name))
     pages = [*range(_page, _PAGES), *range(_page)]  # from where it is scrolled to
     for page in ([remembered[0]] if remembered else []) + pages:
-        yield from _turn(area, page)
-        heights = list(range(ui.y + ui.height - 8, ui.y + 24, -10))  # a button is 20 high
+        yield from scroll(area, page)
+        heights = list(range(ui.y + ui.height - 8, ui.y + 24, -14))  # a button is 20 high
         if remembered:
             heights.insert(0, remembered[1])
         for y in heights:
@@ -320,16 +328,20 @@ _page = 0  # where it is scrolled to
 _found = {}  # page and height of a button, where it was last time
 
 
-def _turn(area, page):
+def scroll(area, page):
     """Scroll to a page of the sidebar with the mouse wheel; a short sidebar would pass it on to the picture."""
     global _page
     if page != _page:
-        ui = region_of(area, "UI")
+        ui = _buttons(area)
         move(ui.x + 4, ui.y + ui.height * 0.5)  # beside the lists, which have a wheel of their own
         yield PAUSE
         _xdo("click", "--repeat", 10 * abs(page - _page), "--delay", 1, 5 if page > _page else 4)
         _page = page
         yield redrawn
+
+
+def _buttons(area):
+    return region_of(area, "WINDOW" if area.type == "PROPERTIES" else "UI")
 
 
 def _hovered(area, region):
@@ -343,9 +355,43 @@ def _hovered(area, region):
         return bpy.context.window_manager.clipboard.removeprefix("bpy.ops.").partition("(")[0]
 
 
+def color_wheel(before):
+    """Window position of the middle of the wheel in the color picker that opened since `before` was on the screen."""
+    now = screen()
+    picker = (now != before).any(-1) & (now == (24, 24, 24)).all(-1)  # its background
+    assert picker.sum() > 10000, "the color picker did not open"
+    (top, *_), (left, *_) = (np.flatnonzero(picker.sum(axis=axis) > 50) for axis in (1, 0))
+    return left + 92, main_window().height - 1 - top - 91
+
+
 def press(area, name, across=0.6):
     """Find a button of the sidebar and click it; `yield from` it."""
     yield from click(*(yield from find(area, name, across)))
+
+
+# --- whether the window goes on ---
+
+
+class Pulse:
+    """Notes when Blender's main loop comes round, and how long its thread has worked by then, till it is stopped."""
+
+    def __init__(self):
+        self._beats, self._stopped = [], False
+        bpy.app.timers.register(self._beat, first_interval=0.0, persistent=True)
+
+    def _beat(self):
+        self._beats.append((monotonic(), thread_time()))
+        return None if self._stopped else 0.005
+
+    def stop(self):
+        """Take no more notes."""
+        self._stopped = True
+
+    def longest(self, begun):
+        """Longest gap in seconds since a moment (`time.monotonic`): by the clock, and of the main thread's own work."""
+        beats = np.array([beat for beat in self._beats if beat[0] >= begun])
+        gaps = np.diff(beats, axis=0).max(axis=0)
+        return {"clock": float(gaps[0]), "thread": float(gaps[1])}
 
 
 # --- what the screen shows ---
@@ -389,5 +435,5 @@ def figure(name, area=None, region=None):
         left, top = _place(part.x, part.y + part.height - 1)
         crop = ["-crop", f"{part.width}x{part.height}+{left}+{top}", "+repage"]
     subprocess.run(
-        ["import", "-window", "root", *crop, "-strip", "-quality", "88", str(Path(target) / f"{name}.jpg")], check=True
+        ["import", "-window", "root", *crop, "-strip", "-quality", "80", str(Path(target) / f"{name}.jpg")], check=True
     )

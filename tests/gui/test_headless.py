@@ -1,5 +1,6 @@
 """The extension in a real Blender without a window: installed, upgraded, and the same results as outside."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -124,6 +125,21 @@ def test_all_front_ends_write_the_same(
     np.testing.assert_allclose(here.astype(float), expected.astype(float), rtol=0, atol=least)
     if ending != ".exr":
         assert np.mean(here != expected) < 1e-3
+
+
+@pytest.mark.parametrize("subcommand", ["recolor", "inspect"])
+def test_the_command_says_that_it_needs_openimageio(
+    subcommand: str, bare_blender: Any, coffee_file: Path, tmp_path: Path
+) -> None:
+    photo = shutil.copy(coffee_file, tmp_path / "photo.png")
+    output = ["-o", tmp_path / "out.png"] if subcommand == "recolor" else []
+    done = bare_blender.run(
+        "--command", "dyehouse", subcommand, photo, "--click", "150,220", "--target", "#1F4E79", *output
+    )
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "OpenImageIO" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["photo.png"]
 
 
 def test_the_command_fails_as_the_command_line(blender: Any, tmp_path: Path) -> None:

@@ -3,48 +3,38 @@
 The bars are what was measured, with a small margin. They may only be tightened.
 """
 
-import os
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from dyehouse.benchmarks import laboratory, rivals, speed_accuracy
+from dyehouse.benchmarks import rivals, speed_accuracy
 from dyehouse.benchmarks.speed_accuracy import BASE, FAILURES, OURS, WELL_BEHAVED, pairs, pooled
 from dyehouse.core import analyze
 from dyehouse.sample_blends import make_scenes
 
-FAST = replace(laboratory.FAST, threads=2)
-COLORS = {name: speed_accuracy.COLORS[name] for name in ("blue", "red")}
-GIVEN_CACHE = os.environ.get("DYEHOUSE_CACHE")
+from .quick import COLORS, FAST
+
+pytestmark = pytest.mark.usefixtures("shared_renders")
+
 
 BARS = {  # scene: CIEDE2000, median and 95th percentile over the pairs
-    "mug": (0.16, 0.62),
-    "fabric_cylinder": (0.14, 0.43),
-    "folds": (0.065, 0.24),
+    "mug": (0.13, 0.6),
+    "fabric_cylinder": (0.135, 0.43),
+    "folds": (0.03, 0.19),
     "folds_mixed": (0.39, 1.76),
-    "sneaker": (0.08, 0.36),
-    "mug_daylight": (0.15, 0.75),
+    "sneaker": (0.075, 0.35),
+    "mug_daylight": (0.15, 0.74),
     "mug_mixed": (0.45, 1.78),
-    "color_bleeding": (0.27, 0.82),
-    "metal": (0.21, 10.5),
+    "color_bleeding": (0.23, 0.76),
+    "metal": (0.19, 9.6),
     "satin": (0.21, 0.71),
-    "translucent_mug": (0.29, 1.22),
+    "translucent_mug": (0.27, 1.12),
     "near_white": (0.72, 5.2),
     "near_black": (0.43, 1.68),
     "pale": (0.39, 2.4),
     "clipped": (0.13, 0.64),
-    "two_lights": (2.28, 7.8),
-    "heather": (0.93, 2.35),
+    "two_lights": (2.25, 7.7),
+    "heather": (0.92, 2.3),
 }
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _cache(tmp_path_factory):
-    # The renders of a test session are shared by its modules; a folder that the user keeps is used as it is.
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("DYEHOUSE_CACHE", GIVEN_CACHE or str(tmp_path_factory.getbasetemp() / "renders-fast"))
-        yield
 
 
 def errors(scene, model="auto"):

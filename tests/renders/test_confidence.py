@@ -1,33 +1,22 @@
 """Predicted against true error, on quick renders: half of the cases that the weights were not fitted to, and all."""
 
-import os
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from dyehouse.benchmarks import laboratory, speed_accuracy
 from dyehouse.benchmarks.calibration import BAD, CAMERAS, GOOD, cases, rank_correlation, scores
 from dyehouse.benchmarks.speed_accuracy import FAILURES, WELL_BEHAVED, pairs
 from dyehouse.core import analyze
 
-FAST = replace(laboratory.FAST, threads=2)
-COLORS = {name: speed_accuracy.COLORS[name] for name in ("blue", "red")}
-SEEN_BY = {name: CAMERAS[name] for name in ("float", "8 bits", "noisy", "4 stops under")}
-GIVEN_CACHE = os.environ.get("DYEHOUSE_CACHE")
+from .quick import COLORS, FAST
 
+pytestmark = pytest.mark.usefixtures("shared_renders")
 
-@pytest.fixture(scope="module", autouse=True)
-def _cache(tmp_path_factory):
-    # The renders of a test session are shared by its modules; a folder that the user keeps is used as it is.
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("DYEHOUSE_CACHE", GIVEN_CACHE or str(tmp_path_factory.getbasetemp() / "renders-fast"))
-        yield
+SEEN_BY = {name: CAMERAS[name] for name in ("float", "8 bits", "noisy", "very noisy", "4 stops under")}
 
 
 @pytest.fixture(scope="module")
-def found():
-    """Every scene through four cameras, from blue to red and back."""
+def found(shared_renders):
+    """Every scene through five cameras, from blue to red and back."""
     return list(cases((*WELL_BEHAVED, *FAILURES), FAST, SEEN_BY, COLORS))
 
 
@@ -47,11 +36,9 @@ def test_nine_tenths_of_pixels_are_below_their_bounds(found):
 def test_what_is_bad_is_flagged_and_what_is_good_is_not(found):
     score = scores(found)
     assert score.bad >= 4
-    # Noise hides a second light from the program: its cases lie at the limit, and are missed.
-    missed = [case for case in found if case.median > BAD and not case.flagged]
-    assert {case.scene for case in missed} <= {"two_lights"}
-    assert all(case.median < 5.5 for case in missed)
-    assert score.good_flagged <= 0.07 * score.good
+    assert score.bad_flagged == score.bad
+    assert score.good > 120
+    assert score.good_flagged <= 0.05 * score.good
 
 
 def test_within_a_picture_the_worse_pixels_are_predicted_worse(found):
@@ -59,13 +46,23 @@ def test_within_a_picture_the_worse_pixels_are_predicted_worse(found):
     assert np.median(ranks) > 0.1
 
 
-@pytest.mark.parametrize("scene", ["satin", "metal", "two_lights"])
-@pytest.mark.parametrize("source", COLORS)
-def test_silk_metal_and_two_lights_are_told_every_time(scene, source):
+def told(scene, source):
     [pair] = [p for p in pairs(scene, FAST, COLORS) if p.source == source]
     analysis = analyze(pair.photo, pair.white, pair.view.reference, pair.view.mask)
     said = analysis.predicted(pair.color(pair.truth)).warnings
-    assert any("silk" in s or "metal" in s or "more than one color" in s for s in said)
+    return any("silk" in s or "metal" in s or "more than one color" in s for s in said)
+
+
+@pytest.mark.parametrize("scene", ["satin", "translucent_mug", "metal", "two_lights"])
+@pytest.mark.parametrize("source", COLORS)
+def test_silk_translucent_metal_and_two_lights_are_told_every_time(scene, source):
+    assert told(scene, source)
+
+
+@pytest.mark.parametrize("scene", ["mug", "fabric_cylinder", "sneaker", "mug_daylight", "clipped", "color_bleeding"])
+@pytest.mark.parametrize("source", COLORS)
+def test_ordinary_products_are_not_taken_for_them(scene, source):
+    assert not told(scene, source)
 
 
 def test_the_bars_are_those_of_the_issue():

@@ -1,29 +1,21 @@
 """Outlines and the light on the surround, on quick renders; errors are 95th percentiles in three pixels."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dyehouse.benchmarks import laboratory, speed_accuracy
 from dyehouse.benchmarks.calibration import SOLES, colored_ground, rim, surround
 from dyehouse.benchmarks.speed_accuracy import pairs
 from dyehouse.core import analyze
+from dyehouse.core.neighborhood import dilate, erode
 
-FAST = replace(laboratory.FAST, threads=2)
+from .quick import COLORS, FAST
+
+pytestmark = pytest.mark.usefixtures("shared_renders")
+
 FINER = replace(FAST, size=128)
 """For the sole, which is four pixels wide."""
-COLORS = {name: speed_accuracy.COLORS[name] for name in ("blue", "red")}
-GIVEN_CACHE = os.environ.get("DYEHOUSE_CACHE")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _cache(tmp_path_factory):
-    # The renders of a test session are shared by its modules; a folder that the user keeps is used as it is.
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("DYEHOUSE_CACHE", GIVEN_CACHE or str(tmp_path_factory.getbasetemp() / "renders-fast"))
-        yield
 
 
 def mean_rim(found, wrong, **options):
@@ -55,6 +47,19 @@ def test_a_mask_a_few_pixels_wrong_on_neutral_ground(wrong, bar):
 def test_a_mask_a_few_pixels_wrong_on_colored_ground(wrong, bar):
     for sole in SOLES.values():
         assert mean_rim(list(colored_ground(sole, FINER, COLORS)), wrong, spill=True) <= bar
+
+
+@pytest.mark.parametrize("scene", ["mug", "fabric_cylinder", "folds", "sneaker", "color_bleeding", "metal", "heather"])
+def test_a_mask_that_is_too_tight_is_told_and_no_other(scene):
+    for pair in pairs(scene, FINER, COLORS):
+        true = pair.view.mask > 0.5
+
+        def warns(mask, pair=pair):
+            found = analyze(pair.photo, pair.white, pair.view.reference, mask)
+            return any("leaves out a rim" in said for said in found.warnings)
+
+        assert not any(warns(mask) for mask in (pair.view.mask, true, dilate(true, 1)))
+        assert all(warns(erode(true, pixels)) for pixels in (1, 2, 3))
 
 
 def test_bleeding_on_a_neutral_surround_moves_along():

@@ -1,28 +1,18 @@
 """The footing that the program finds by itself, on quick renders: a click with gloss, the reference, the white."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dyehouse.benchmarks import laboratory, speed_accuracy
 from dyehouse.benchmarks.calibration import clicks, footings, guesses
 from dyehouse.benchmarks.speed_accuracy import pairs
 from dyehouse.core import analyze
 from dyehouse.core.reference import SURE_WHITE
 
-FAST = replace(laboratory.FAST, threads=2)
-COLORS = {name: speed_accuracy.COLORS[name] for name in ("blue", "red")}
-GIVEN_CACHE = os.environ.get("DYEHOUSE_CACHE")
+from .quick import COLORS, FAST
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _cache(tmp_path_factory):
-    # The renders of a test session are shared by its modules; a folder that the user keeps is used as it is.
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("DYEHOUSE_CACHE", GIVEN_CACHE or str(tmp_path_factory.getbasetemp() / "renders-fast"))
-        yield
+pytestmark = pytest.mark.usefixtures("shared_renders")
 
 
 def test_gloss_in_the_click_does_not_ruin_a_flat_swatch():

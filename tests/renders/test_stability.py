@@ -1,28 +1,19 @@
 """Short runs of the curves of benchmarks/stability.py: errors grow as they must, and the program says what it can."""
 
-import os
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from dyehouse.benchmarks import laboratory, speed_accuracy, stability
+from dyehouse.benchmarks import stability
 from dyehouse.benchmarks.speed_accuracy import pairs
 from dyehouse.benchmarks.stability import FALLS_BACK, NOTHING, REFUSES, WARNS, Outcome, faultless, outcome
 
-FAST = replace(laboratory.FAST, threads=2)
-COLORS = {name: speed_accuracy.COLORS[name] for name in ("blue", "red")}
-GIVEN_CACHE = os.environ.get("DYEHOUSE_CACHE")
+from .quick import COLORS, FAST
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _cache(tmp_path_factory):
-    # The renders of a test session are shared by its modules; a folder that the user keeps is used as it is.
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("DYEHOUSE_CACHE", GIVEN_CACHE or str(tmp_path_factory.getbasetemp() / "renders-fast"))
-        # From the first two colors to each other is enough here.
-        patch.setattr(stability, "TARGETS", COLORS)
-        yield
+def _two_colors(shared_renders):
+    # From the first two colors to each other is enough here.
+    shared_renders.setattr(stability, "TARGETS", COLORS)
 
 
 def outcomes(curve):
@@ -68,11 +59,12 @@ def test_a_power_law_hardly_matters_and_an_s_curve_does():
     assert gamma[1].mean < 1.3 * gamma[0].mean
 
 
-def test_gloss_in_the_reference_ruins_a_flat_swatch_and_not_a_real_sample():
+def test_gloss_in_the_reference_ruins_a_flat_swatch_under_the_plain_model_only():
     flat, sample = outcomes(stability.contamination(FAST, shares=(0, 0.02, 0.1)))
     assert flat[0].median < 0.5
     assert 1 < flat[1].median < flat[2].median
     assert flat[2].does == WARNS
+    assert flat[2].auto_median < 0.5  # the gloss is found and taken away
     assert sample[2].median == pytest.approx(sample[0].median, rel=0.1)
 
 

@@ -118,6 +118,75 @@ def test_other_kinds_of_color(value, expected):
     np.testing.assert_allclose(swatch.color.xyz, expected, atol=1e-9)
 
 
+LAB = "<cc:ColorCIELab ColorSpecification='S'><cc:L>42</cc:L><cc:A>55</cc:A><cc:B>-35</cc:B></cc:ColorCIELab>"
+CUSTOM = "<cc:TristimulusSpec>{}<cc:Observer>{}</cc:Observer></cc:TristimulusSpec>"
+
+
+@pytest.mark.parametrize(("degrees", "theirs"), [("2_Degree", "2 Degree"), ("10_Degree", "10 Degree")])
+@pytest.mark.parametrize("by_points", [False, True])
+def test_an_illuminant_of_the_file_s_own(degrees, theirs, by_points):
+    lamp = colour.SDS_ILLUMINANTS["LED-RGB1"].copy().align(colour.SpectralShape(380, 780, 5))
+    powers = " ".join(map(str, lamp.values))
+    inside = f'<cc:CustomIlluminant Name="Lamp" WLStart="380" List_Increment="5"><cc:SPDList>{powers}</cc:SPDList>'
+    if by_points:
+        points = zip(lamp.wavelengths, lamp.values, strict=True)
+        inside = "<cc:CustomIlluminant>" + "".join(
+            f'<cc:SpectralPoint WL="{nm}">{v}</cc:SpectralPoint>' for nm, v in points
+        )
+    data = cxf(LAB, CUSTOM.format(inside + "</cc:CustomIlluminant>", degrees))
+    library = swatch_files.parse(data, ".cxf", "x")
+    assert library.notes == ()
+    ((xyz, white),) = [(s.color.xyz, s.color.white) for s in library.swatches]
+    cmfs = colour.MSDS_CMFS[f"CIE {'1931' if degrees[0] == '2' else '1964'} {theirs} Standard Observer"]
+    expected = colour.sd_to_XYZ(colour.sd_ones(lamp.shape), cmfs, lamp) / 100
+    np.testing.assert_allclose(white, expected, rtol=2e-4)  # theirs is summed at the lamp's own 5 nm
+    np.testing.assert_allclose(colorimetry.xyz_to_lab(xyz, white), (42, 55, -35), atol=1e-9)
+    assert library.swatches[0].color.illuminant == ""
+
+
+def test_a_white_that_the_file_gives():
+    named = CUSTOM.format('<cc:Illuminant X="90" Y="100" Z="40">Custom</cc:Illuminant>', "10_Degree")
+    (swatch,) = swatch_files.parse(cxf(LAB, named), ".cxf", "x").swatches
+    np.testing.assert_allclose(swatch.color.white, (0.9, 1, 0.4))
+    assert (swatch.color.illuminant, swatch.color.observer) == ("", "1964")
+    np.testing.assert_allclose(colorimetry.xyz_to_lab(swatch.color.xyz, swatch.color.white), (42, 55, -35), atol=1e-9)
+
+
+def test_lamps_by_their_makers_names():
+    for name, ours in (("TL83", "FL12"), ("TL84", "FL11"), ("UL30", "FL12"), ("UL50", "FL10"), ("F7", "FL7")):
+        data = cxf(LAB, CUSTOM.format(f"<cc:Illuminant>{name}</cc:Illuminant>", "2_Degree"))
+        assert swatch_files.parse(data, ".cxf", "x").swatches[0].color.illuminant == ours
+
+
+def test_what_cannot_be_known_of_light_and_observer_is_told():
+    unknown = CUSTOM.format("<cc:Illuminant>UL35</cc:Illuminant>", "2_Degree")
+    html = "<cc:ColorHTML HTML='#C0392B'/>"
+    library = swatch_files.parse(cxf(LAB + html, unknown), ".cxf", "x")
+    assert library.swatches[0].color == parse_target("#C0392B").color
+    assert any("UL35" in note for note in library.notes)
+    with pytest.raises(FileError, match="without a color that is known"):
+        swatch_files.parse(cxf(LAB, unknown), ".cxf", "x")
+    own = CUSTOM.format("<cc:Illuminant>D50</cc:Illuminant>", "Custom_CMF").replace("r>C", 'r Angle="8">C')
+    library = swatch_files.parse(cxf(LAB, own), ".cxf", "x")
+    assert library.swatches[0].color.observer == "1964"
+    assert any("observer of its own" in note for note in library.notes)
+
+
+def test_a_spectrum_point_by_point():
+    nm, values = [390, 420, 450, 500, 540, 600, 650, 710], np.linspace(0.1, 0.8, 8)
+    points = "".join(
+        f'<cc:SpectralPoint WL="{w}">{v}</cc:SpectralPoint>' for w, v in list(zip(nm, values, strict=True))[::-1]
+    )
+    spectrum = f"<cc:CustomSpectrum ColorSpecification='S'>{points}</cc:CustomSpectrum>"
+    measured = "<cc:MeasurementSpec><cc:MeasurementType>{}</cc:MeasurementType></cc:MeasurementSpec>"
+    data = cxf(spectrum, measured.format("Spectrum_Reflectance"))
+    (swatch,) = swatch_files.parse(data, ".cxf", "x").swatches
+    np.testing.assert_array_equal(swatch.color.wavelengths, nm)
+    np.testing.assert_allclose(swatch.color.values, values)
+    with pytest.raises(FileError, match="without a color that is known"):  # a light has no color of a product
+        swatch_files.parse(cxf(spectrum, measured.format("Spectrum_Emissive")), ".cxf", "x")
+
+
 def test_inks_of_a_device():
     inks = "<cc:Cyan>100</cc:Cyan><cc:Magenta>50</cc:Magenta><cc:Yellow>0</cc:Yellow><cc:Black>20</cc:Black>"
     data = cxf(f"<cc:ColorCMYK>{inks}</cc:ColorCMYK>").replace(b"ColorValues", b"DeviceColorValues")
@@ -138,6 +207,11 @@ def test_inks_of_a_device():
         (cxf(REFLECTANCE.format("90 " * 20), STEP_20), "line 4.*goes up to 90"),
         (cxf("<cc:ColorHTML HTML='#12'/>"), "line 4.*ColorHTML is not understood"),
         (cxf("<cc:ColorDensity/>"), "without a color that is known"),
+        (cxf(LAB, CUSTOM.format("<cc:CustomIlluminant WLStart='400' List_Increment='50'><cc:SPDList>1 1 1 1 1 1"
+                                "</cc:SPDList></cc:CustomIlluminant>", "2_Degree")), "no power from 400 to 700"),
+        (cxf(LAB, CUSTOM.format("<cc:CustomIlluminant><cc:SPDList>1</cc:SPDList></cc:CustomIlluminant>", "2_Degree")),
+         "WLStart"),
+        (cxf(LAB, CUSTOM.format("<cc:Illuminant X='0' Y='1' Z='1'>Custom</cc:Illuminant>", "2_Degree")), "not above 0"),
         (cxf("<cc:ColorCIELab ColorSpecification='S'><cc:L>1</cc:L><cc:A>1</cc:A><cc:B>1</cc:B></cc:ColorCIELab>",
              "<cc:TristimulusSpec><cc:Illuminant>Moon</cc:Illuminant></cc:TristimulusSpec>"), "line 4.*Moon"),
     ],

@@ -202,6 +202,33 @@ def test_spectral_cgats(name, start, end, step):
     np.testing.assert_allclose(swatch.color.values, values / 100)
 
 
+@pytest.mark.parametrize(("field", "scale"), [("SPECTRAL_PCT", 100), ("SPECTRAL_DEC", 1)])
+@pytest.mark.parametrize("in_one_set", [True, False])
+def test_spectral_cgats_in_pairs(field, scale, in_one_set):
+    """As ISO 28178 has it: a wavelength, its value, in one set of a sample or in a set for each wavelength."""
+    wanted = {}
+    rows = []
+    for name, wavelengths in (
+        ("black", np.arange(400, 701, 20)),
+        ("wine", np.arange(400, 701, 20)),
+        ("gray", np.arange(380, 731, 10)),
+    ):
+        values = np.linspace(0.004, 0.012 if name == "black" else 0.9, len(wavelengths))
+        wanted[name] = wavelengths, values
+        pairs = [f"{nm} {v * scale!r}" for nm, v in zip(wavelengths, values.tolist(), strict=True)]
+        rows += [f"{name} {' '.join(pairs)}"] if in_one_set else [f"{name} {pair}" for pair in pairs]
+    if in_one_set:  # all sets of a table have as many fields
+        wanted.pop("gray")
+        rows.pop()
+    fields = "SAMPLE_NAME" + f" SPECTRAL_NM {field}" * (16 if in_one_set else 1)
+    library = parse(cgats(fields, "\n".join(rows)), ".txt")
+    assert {swatch.text for swatch in library.swatches} == set(wanted)
+    for swatch in library.swatches:
+        wavelengths, values = wanted[swatch.text]
+        np.testing.assert_array_equal(swatch.color.wavelengths, wavelengths)
+        np.testing.assert_allclose(swatch.color.values, values)
+
+
 @pytest.mark.parametrize(
     ("head", "light", "observer"),
     [
@@ -250,7 +277,9 @@ def test_cgats_of_what_is_not_all_spectral():
         (cgats("SAMPLE_ID LAB_L LAB_A LAB_B", "1 2 3 x"), "line 8.*lacks a number"),
         (cgats("SAMPLE_ID DENSITY", "1 2"), "hold no color"),
         (cgats("SAMPLE_ID LAB_L LAB_A LAB_B", "1 2 3 4").replace("END_DATA\n", ""), "without END_DATA"),
-        (cgats("SAMPLE_ID SPECTRAL_NM SPECTRAL_PCT", "1 2 3"), "pairs of wavelength"),
+        (cgats("SAMPLE_ID SPECTRAL_NM SPECTRAL_PCT", "1 400 3"), "hold no color"),
+        (cgats("SAMPLE_ID SPECTRAL_NM SPECTRAL_PCT", "1 400 x"), "line 8.*'400 x' is no pair"),
+        (cgats("SAMPLE_ID SPECTRAL_NM LAB_L", "1 400 3"), "SPECTRAL_NM is followed by LAB_L"),
     ],
 )
 def test_malformed_cgats(text, said):

@@ -42,5 +42,6 @@ def draws_every_panel():
     bpy.ops.dyehouse.use_swatch(image=image.name, library="ColorChecker", index=3)
     for name in PANELS:
         assert hasattr(bpy.types, f"DYEHOUSE_PT_{name}"), name
-    yield gui.redrawn
+    bpy.ops.dyehouse.pick_region(image=image.name, pixel=(272, 151))
+    yield from gui.settle()
     gui.figure("blender-panels", area)

@@ -168,11 +168,12 @@ def a_photo_in_another_space():
     codes = transfer.encode(_patches(), space.curve, np.uint8)
     path = gui.folder / "wide.png"
     files.write(path, codes, files.Photo(path, codes, space))
-    # Blender reads it as sRGB; where it is set to Display P3 the preview is up to 3 codes off (docs/blender.md).
-    image, region = yield from _shown("wide.png", "sRGB")
-    image.dyehouse.color_space = "display-p3"
-    with_region(image, (120, 110), color=(0.01, 0.3, 0.02))
-    yield from _same_as_written(image, region)
+    for name in ("sRGB", "Display P3"):
+        image, region = yield from _shown("wide.png", name)
+        image.dyehouse.color_space = "display-p3"
+        with_region(image, (120, 110), color=(0.01, 0.3, 0.02))
+        yield from _same_as_written(image, region)
+        bpy.data.images.remove(image)
 
 
 def undo_and_redo():
@@ -255,6 +256,35 @@ def a_region_that_cannot_be_found_is_said():
     yield from gui.image_editor(image)
     yield lambda: "is not picked yet" in preview.shown(image)[1]
     yield gui.redrawn
+
+
+def _refusal(operator, **properties):
+    """What the operator says against being run; empty if it does run."""
+    try:
+        operator(**properties)
+    except RuntimeError as error:
+        return str(error)
+    return ""
+
+
+def a_region_that_is_not_picked_yet_leaves_the_others():
+    image = gui.load("photo.png")
+    with_region(image)
+    _, _, region = yield from gui.image_editor(image, tab="Dyehouse")
+    yield from ready(image)
+    expected = _expected(image)
+    bpy.ops.dyehouse.add_region(image=image.name, name="Sole")
+    assert image.dyehouse.active_region == 1
+    image.dyehouse.overlay = "ERROR"  # of the region that is not picked
+    image.dyehouse.regions[0].target.color = (0.7, 0.02, 0.01)
+    yield from gui.settle()
+    image.dyehouse.regions[0].target.color = (0.02, 0.1, 0.3)
+    yield from gui.settle()
+    assert _differences(image, region, expected, columns=slice(0, 10)).max() <= 1
+    assert "'Sole' is not picked yet" in _refusal(bpy.ops.dyehouse.write_image, image=image.name)
+    image.dyehouse.regions[1].mask_source = "IMAGE"  # none is chosen
+    yield from gui.settle()
+    assert _differences(image, region, expected, columns=slice(0, 10)).max() <= 1
 
 
 def two_editors_show_it():
