@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from ..core.transfer import Curve
     from .session import Look
 
-# Pixels of a texture at most: more than an editor on a usual screen has.
-_MOST_PIXELS = 2_400_000
+# Pixels of the whole photo's texture at most: what a view that rests shows of it comes in full resolution after it.
+_MOST_PIXELS = 1_200_000
 # Of all layers together: 16 bytes each.
 _MOST_TEXELS = 10_000_000
 # Seconds that the view must rest before its part of the photo is fetched in full resolution.

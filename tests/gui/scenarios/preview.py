@@ -319,7 +319,7 @@ def the_picture_is_sharp_where_it_is_zoomed():
     window, area, region = yield from gui.image_editor(large)
     yield from ready(large)
     now, _ = preview.shown(large)
-    assert now.whole.step == 2, now.whole.step
+    assert now.whole.step > 1
     gui.call(window, area, region, bpy.ops.image.view_zoom_ratio, ratio=2.0)
     yield lambda: any(key[-1] == 1 for key in preview._textures)
     yield gui.redrawn
