@@ -94,9 +94,8 @@ def refine_outline(
         The shares, or None where no pixel needs one.
     """
     margin = reach(picture.shape)
-    sure, clear = above(mask, 1 - _CLEAR), ~above(mask, _CLEAR)
-    inner, outer = _around(mask, margin)
-    band = outer & ~inner
+    inside, outer, sure, clear = _grounds(mask, margin)
+    band = outer & ~inside
     band |= ~(clear | sure)
     if spill is None:
         band &= mask > 0  # what lies outside stays as it is
@@ -108,11 +107,10 @@ def refine_outline(
     if len(rows) == 0:
         return mask, None
     asked = as_weights(original[rows, columns])
-    inner &= sure
     np.logical_not(outer, out=outer)
     outer &= clear
     del sure
-    find = _Outline(picture, (inner, outer, clear), margin, reference, white, splits, spill)
+    find = _Outline(picture, (inside, outer, clear), margin, reference, white, splits, spill)
     share, taken = np.empty((len(rows), 3), np.float32), np.empty(len(rows), np.float32)
     for start in range(0, len(rows), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
@@ -133,26 +131,26 @@ def rim_left_out(picture: Picture, mask: NDArray, reference: NDArray, white: NDA
     covered pixels about a hard mask that is right.
     """
     margin = reach(picture.shape)
-    clear = ~above(mask, _CLEAR)
-    inner, outer = _around(mask, margin)
+    inside, outer, _, clear = _grounds(mask, margin)
     beside = np.flatnonzero(outer & clear)
     beside = beside[:: max(1, len(beside) // _RIM_SAMPLE)]
     if len(beside) == 0:
         return 0.0
     rows, columns = np.divmod(beside, mask.shape[1])
-    inner &= above(mask, 1 - _CLEAR)
-    spill = np.zeros(picture.shape, np.float32)
-    find = _Outline(picture, (inner, ~outer & clear, clear), margin, reference, white, True, spill)
+    none = np.broadcast_to(np.float32(0), picture.shape)
+    find = _Outline(picture, (inside, ~outer & clear, clear), margin, reference, white, True, none)
     return margin * float(find.shares(rows, columns, np.zeros(len(rows)))[1].mean())
 
 
-def _around(mask: NDArray, margin: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Where everything up to `margin` away is covered by more than half; where anything is."""
-    inner, outer = np.zeros(mask.shape, bool), np.zeros(mask.shape, bool)
+def _grounds(mask: NDArray, margin: int) -> tuple[NDArray[np.bool_], ...]:
+    """Where a mask, wrong by `margin` at most, is surely the product; may be; covers all of a pixel; covers nothing."""
+    sure, clear = above(mask, 1 - _CLEAR), ~above(mask, _CLEAR)
+    inside, outer = np.zeros(mask.shape, bool), np.zeros(mask.shape, bool)
     box = tuple(slice(max(0, side.start - margin), side.stop + margin) for side in bounding_box(mask))
     solid = above(mask[box], 0.5)
-    inner[box], outer[box] = erode(solid, margin), dilate(solid, margin)
-    return inner, outer
+    inside[box], outer[box] = erode(solid, margin), dilate(solid, margin)
+    inside &= sure
+    return inside, outer, sure, clear
 
 
 class _Outline:

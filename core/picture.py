@@ -87,8 +87,7 @@ class Picture:
             step = _step(height * width, most)
             some = part(slice(step // 2, None, step), slice(step // 2, None, step))
             return some.reshape(-1, some.shape[2])
-        # A mask that is soft all over is taken where it is strongest.
-        inside = above(mask, 0.95 * min(1.0, float(as_weights(mask.max()))))
+        inside = strongest(mask)
         step = _step(int(np.count_nonzero(inside)), most)
         grid = inside[step // 2 :: step, step // 2 :: step]
         if not grid.any():
@@ -187,6 +186,11 @@ def as_weights(mask: NDArray) -> NDArray[np.float32]:
 def above(mask: NDArray, level: float) -> NDArray[np.bool_]:
     """Where a checked mask covers more than `level`, 0..1, without its weights as floats."""
     return mask > (int(level * np.iinfo(mask.dtype).max) if mask.dtype.kind == "u" else level)
+
+
+def strongest(mask: NDArray) -> NDArray[np.bool_]:
+    """Where a checked mask covers all of a pixel, or, if it is soft all over, where it covers most."""
+    return above(mask, 0.95 * min(1.0, float(as_weights(mask.max()))))
 
 
 def bounding_box(mask: NDArray) -> tuple[slice, slice]:

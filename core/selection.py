@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from . import interreflection, mixture
 from .dichromatic import sine
 from .mixture import Mixture
-from .picture import Picture, as_weights
+from .picture import Picture, as_weights, strongest
 from .reference import window_radius
 from .separation import MODEL_ERROR, NO_GLOSS, USUAL_BOUNCE, frame, split
 from .stability import Noise
@@ -407,7 +407,7 @@ def _windows(picture: Picture, mask: NDArray | None, reach: int) -> tuple[NDArra
     A window around a clipped pixel is that pixel.
     """
     height, width = picture.shape
-    whole = np.ones((height, width), bool) if mask is None else mask > 0.95 * float(mask.max())
+    whole = np.ones((height, width), bool) if mask is None else strongest(mask)
     step = max(1, int(np.sqrt(np.count_nonzero(whole) / _SAMPLE)))
     rows, columns = np.nonzero(whole[step // 2 :: step, step // 2 :: step])
     rows, columns = (at * step + step // 2 for at in (rows, columns))
