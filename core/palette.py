@@ -7,6 +7,7 @@ none, depends on its color alone; the others, along outlines and where correctio
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 from .compositing import Edge
 from .picture import Picture, bands
 
-# Codes of a color: three bytes; what is done to it stands above them. So many neighbors in blue make a block.
-_BYTES, _BLOCK = 24, 3
+# Codes of a color: three bytes; what is done to it stands above them. So many bits of red make a block.
+_BYTES, _BLOCK = 24, 4
 _WITHIN = (1 << _BLOCK) - 1
 
 # Looking up saves time from so many pixels on, if no more than these shares of them are of a color of their own, or to
@@ -83,9 +84,8 @@ class Palette:
             keys, inside, single = _keys(picture, regions, rows, box[1])
             self.inside += inside
             singles.append(single + (rows.start - box[0].start) * width)
-            found[rows.start] = keys.astype(np.uint32)
-            keys >>= _BLOCK
-            seen[keys] = True
+            found[rows.start] = keys
+            seen[keys >> _BLOCK] = True
         self.rows, self.columns = np.divmod(np.concatenate(singles), width)
         self.rows += box[0].start
         self.columns += box[1].start
@@ -93,27 +93,37 @@ class Palette:
         self.light = picture.at(self.rows, self.columns)
         # Few of all blocks are seen, and few of the colors in these: found in two steps, the tables stay small.
         blocks = np.flatnonzero(seen)
-        number = np.empty(len(seen), np.uint32)
-        number[blocks] = np.arange(len(blocks), dtype=np.uint32) << _BLOCK
+        number = np.empty(len(seen), np.intp)
+        number[blocks] = np.arange(0, len(blocks) << _BLOCK, 1 << _BLOCK)
         seen = np.zeros(len(blocks) << _BLOCK, bool)
-        for every in found.values():
-            within = number.take(every >> _BLOCK)
-            every &= _WITHIN
-            every |= within
-            seen[every.astype(np.intp)] = True
-        colors = np.flatnonzero(seen)
-        place = np.empty(len(seen), np.uint16 if len(colors) <= 1 << 16 else np.uint32)
-        place[colors] = np.arange(len(colors))
-        self._places = {start: place.take(every) for start, every in found.items()}
-        keys = (blocks[colors >> _BLOCK] << _BLOCK) | (colors & _WITHIN)
+        for start, keys in found.items():
+            within = keys & _WITHIN
+            keys >>= _BLOCK
+            within += number.take(keys)
+            seen[within] = True
+            found[start] = within
+        self._found, self._slots = found, np.flatnonzero(seen)
+        keys = (blocks[self._slots >> _BLOCK] << _BLOCK) | (self._slots & _WITHIN)
         self.codes = keys.astype("<u4").view(np.uint8).reshape(-1, 4)[:, :3]
         self.ends = np.searchsorted(keys, np.arange(1, kinds + 1) << _BYTES)
         area = height * width
         self.worthwhile = len(keys) <= _DISTINCT * area and len(self.rows) <= _SINGLE * area
 
-    def at(self, rows: slice) -> NDArray:
-        """(n,) places in `codes` of the pixels of a band of the box, one of `picture.bands`."""
-        return self._places[rows.start]
+    @cached_property
+    def counts(self) -> NDArray[np.intp]:
+        """(n,) how many pixels have each color."""
+        found = sum(np.bincount(slots, minlength=self._slots[-1] + 1) for slots in self._found.values())
+        return np.asarray(found)[self._slots]
+
+    def table(self, values: NDArray[np.uint8]) -> NDArray[np.void]:
+        """(n, 3) codes, one for each of `codes`, as what :meth:`look_up` looks up."""
+        table = np.empty((self._slots[-1] + 1, 3), np.uint8)
+        table[self._slots] = values
+        return table.view("V3")[:, 0]
+
+    def look_up(self, table: NDArray[np.void], rows: slice) -> NDArray[np.uint8]:
+        """(m, 3) codes of the pixels of a band of the box, one of `picture.bands`."""
+        return table.take(self._found[rows.start], mode="clip").view(np.uint8).reshape(-1, 3)
 
 
 def _keys(

@@ -273,10 +273,12 @@ class _Job:
                 _product(linear[part], self.matrices[k], result[part])
             else:
                 result[part] += _product(linear[part], change, np.empty_like(linear[part]))
-        self.recolored, self.beyond = self._encoded(result)
+        codes, beyond = self._encoded(result)
+        self.recolored = palette.table(codes)
         singles = [self._singly(palette, start) for start in range(0, len(palette.rows), _SINGLES)]
         self.singles = np.concatenate([np.empty((0, 3), np.uint8), *(codes for codes, _, _ in singles)])
-        self.looked_up = palette.inside + sum(s[1] for s in singles), sum(s[2] for s in singles)
+        outside = int(palette.counts[beyond].sum()) if beyond.any() else 0
+        self.looked_up = palette.inside + sum(s[1] for s in singles), outside + sum(s[2] for s in singles)
         self.palette = palette
 
     def _singly(self, palette: Palette, start: int) -> tuple[NDArray[np.uint8], int, int]:
@@ -306,21 +308,18 @@ class _Job:
         transfer.Encoder(self.curve, self.dtype).into(result, codes)
         return codes[0], beyond
 
-    def _run_looked_up(self, palette: Palette, rows: slice) -> tuple[int, int]:
-        """Look a band up; returns what :meth:`run` does, without what is in `looked_up`."""
-        places = palette.at(rows)
+    def _run_looked_up(self, palette: Palette, rows: slice) -> None:
         target = self.out[rows, self.columns, :3]
-        found = self.recolored.view("V3")[:, 0].take(places, mode="clip")
-        target[...] = found.view(np.uint8).reshape(target.shape)
+        target[...] = palette.look_up(self.recolored, rows).reshape(target.shape)
         first, last = np.searchsorted(palette.rows, (rows.start, rows.stop))
         self.out[palette.rows[first:last], palette.columns[first:last], :3] = self.singles[first:last]
-        return 0, int(np.count_nonzero(self.beyond.take(places, mode="clip"))) if self.beyond.any() else 0
 
     def run(self, parts: list[slice]) -> tuple[int, int]:
         """Recolor these bands; returns (pixels in regions, pixels out of gamut)."""
         if self.palette is not None:
-            both = [self._run_looked_up(self.palette, rows) for rows in parts]
-            return sum(b[0] for b in both), sum(b[1] for b in both)
+            for rows in parts:
+                self._run_looked_up(self.palette, rows)
+            return 0, 0
         inside = outside = 0
         if not parts:
             return 0, 0
