@@ -7,6 +7,7 @@ import contextlib
 import errno
 import json
 import os
+import re
 import secrets
 import shutil
 import signal
@@ -21,7 +22,7 @@ from typing import Any
 
 from ..core.errors import FileError
 from . import checks, engine, storage
-from .jobs import Job, Problem, gather
+from .jobs import Job, Problem, gather, in_order
 from .journal import Journal
 
 JOURNAL, PAGE = "dyehouse-journal.jsonl", "index.html"
@@ -31,6 +32,9 @@ _TELL_EVERY = 10.0
 
 # Free bytes under which the disk counts as full.
 _FULL = 1 << 20
+
+# Names under which files are written before they get their own.
+_UNFINISHED = re.compile(r"\.dyehouse-[0-9a-f]{12}(\.\w+)?")
 
 
 @dataclass(frozen=True)
@@ -118,11 +122,14 @@ class Run:
     def entries(self) -> Iterator[dict[str, Any]]:
         """Do the work; yields an entry for each result when it is done, kept, set aside or failed."""
         try:
-            with self._executor() as (executor, workers):
-                results = engine.run(self._tasks(), _perform_all, executor, workers, _failures, self.stop)
+            with self._executor() as (executor, workers, alive):
+                results = engine.run(self._tasks(), _perform_all, executor, workers, _failures, self.stop, alive)
                 with contextlib.closing(results):
                     for entries in results:
                         yield from self._noted(entries)
+        except engine.LostError as error:
+            self.stopped = f"{error}: start it again, then go on with --resume."
+        else:
             if self.settings.sheets and not self.stopped:
                 self._write_page()
         finally:
@@ -150,7 +157,7 @@ class Run:
         return os.strerror(errno.ENOSPC) in reason or shutil.disk_usage(self.settings.out).free < _FULL
 
     @contextlib.contextmanager
-    def _executor(self) -> Iterator[tuple[Any, int]]:
+    def _executor(self) -> Iterator[tuple[Any, int, Any]]:
         from . import work
 
         settings = self.settings
@@ -162,10 +169,10 @@ class Run:
         asked = cores if settings.workers is None else settings.workers
         workers = max(1, min(asked, len(self.jobs)))
         if asked == 0 or _in_blender():
-            yield engine.threads_of(workers), workers
+            yield engine.threads_of(workers), workers, lambda: True
         else:
             threads = max(1, cores // workers)
-            yield engine.processes(workers, threads, work.begin, str(self.journal.path), threads), workers
+            yield engine.processes(workers, threads, work.begin, str(self.journal.path), threads), workers, lambda: True
 
     def _tasks(self) -> Iterator[list[Any]]:
         from .work import Task
@@ -241,7 +248,7 @@ def _remove_unfinished(folder: Path) -> None:
     """Remove what workers were writing when they were killed."""
     for place, _, names in os.walk(folder):
         for name in names:
-            if name.startswith(".dyehouse-"):
+            if _UNFINISHED.fullmatch(name):
                 Path(place, name).unlink(missing_ok=True)
 
 
@@ -271,7 +278,11 @@ def command_line(options: argparse.Namespace) -> int:
     if options.resume and options.force:
         raise FileError("--resume and --force contradict each other: give one of them.")
     jobs, problems = gather(options.tables, options.recipe)
-    problems += checks.outputs(jobs, options.out, replacing=options.resume or options.force)
+    replacing = options.resume or options.force
+    problems += checks.outputs(jobs, options.out, replacing=replacing)
+    page = storage.join(options.out, PAGE)
+    if not (options.no_sheets or replacing or problems) and storage.exists(page):
+        problems.append(Problem(None, f"'{page}' exists already: give --resume to go on, or --force to replace it."))
     if options.check:
         problems += checks.inputs(jobs)
         if not problems:
@@ -288,9 +299,9 @@ def command_line(options: argparse.Namespace) -> int:
 
 
 def _tell_problems(problems: Sequence[Problem], *, as_json: bool) -> None:
-    for problem in problems:
+    for problem in in_order(problems):
         if as_json:
-            print(json.dumps({"where": problem.where, "error": problem.message}, ensure_ascii=False))
+            print(json.dumps(problem.as_dict(), ensure_ascii=False))
         else:
             print(f"dyehouse: {problem}", file=sys.stderr)
     if not as_json:

@@ -1,7 +1,8 @@
-"""`dyehouse demo`: two real photographs, several colorways each, from one click."""
+"""`dyehouse demo`: two real photographs, several colorways each, from one click; and a small catalog to try."""
 
 from __future__ import annotations
 
+import shutil
 import time
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -57,6 +58,30 @@ SUBJECTS = (
     ),
 )
 
+# The catalog that docs/catalog.md begins with.
+RECIPE = """\
+photo = "photos/astronaut.png"
+
+[[region]]
+name = "suit"
+click = [100, 350]
+
+[[colorway]]
+name = "navy"
+targets = { suit = "#1F4E79" }
+
+[[colorway]]
+name = "bottle green"
+targets = { suit = "lab(42, -38, 16)" }
+
+[output]
+pattern = "{photo}-{colorway}.jpg"
+"""
+TABLE = """\
+photo,click,white,colorways,output
+photos/coffee.png,120 250,395 90,petrol=#17606E | leaf green=lab(45 -40 25) | charcoal=#2B2D2F,{photo}-{colorway}.jpg
+"""
+
 
 def sample_photo(name: str) -> Path:
     """Find a photo that comes with scikit-image.
@@ -74,7 +99,7 @@ def sample_photo(name: str) -> Path:
 
 
 def run(folder: Path, *, quiet: bool = False) -> dict[str, Any]:
-    """Make the demo's pictures, maps and contact sheet.
+    """Make the demo's pictures, maps, contact sheet and catalog.
 
     Parameters
     ----------
@@ -88,7 +113,7 @@ def run(folder: Path, *, quiet: bool = False) -> dict[str, Any]:
     The folder, the files in it, and a report for each photo, as plain values.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "photos").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"The folder '{folder}' cannot be made ({error.strerror}): choose another one.") from None
     rows, written, reports = [], [], {}
@@ -119,10 +144,28 @@ def run(folder: Path, *, quiet: bool = False) -> dict[str, Any]:
     overview = sheet.contact_sheet(rows)
     target = folder / "contact-sheet.png"
     files.write(target, overview, files.Photo(Path(), overview, files.SRGB), force=True)
-    written.append(target)
+    written += [target, *_catalog(folder)]
     if not quiet:
         print(f"Wrote {len(written)} files to {folder.resolve()}; start with {target.name}")
-    return {"folder": str(folder.resolve()), "files": [path.name for path in written], "reports": reports}
+    return {
+        "folder": str(folder.resolve()),
+        "files": [path.relative_to(folder).as_posix() for path in written],
+        "reports": reports,
+    }
+
+
+def _catalog(folder: Path) -> list[Path]:
+    """Write the photos, a recipe for one of them and a table for the other."""
+    photos = [folder / "photos" / subject.file for subject in SUBJECTS]
+    recipe, table = folder / "suit.toml", folder / "catalog.csv"
+    try:
+        for path in photos:
+            shutil.copyfile(sample_photo(path.name), path)
+        recipe.write_text(RECIPE)
+        table.write_text(TABLE)
+    except OSError as error:
+        raise FileError(f"'{folder}' could not be written ({error.strerror}): check the disk and folder.") from None
+    return [*photos, recipe, table]
 
 
 def _asking(prepared: photo.Prepared, swatch: photo.Swatch) -> photo.Prepared:

@@ -18,7 +18,7 @@ from concurrent.futures import (
 )
 from typing import Any
 
-from ..core.errors import FileError
+from ..core.errors import DyehouseError, FileError
 
 # Tasks that wait beside each one that is being worked on.
 _AHEAD = 2
@@ -28,6 +28,10 @@ _REACHED = 10
 
 # Seconds between looks at whether a stop is asked for.
 _PULSE = 0.2
+
+
+class LostError(DyehouseError):
+    """An executor that takes no more tasks, such as a cluster that is gone."""
 
 
 class Stop:
@@ -43,6 +47,7 @@ def run[Task, Result](
     workers: int,
     failed: Callable[[Task, str], Result],
     stop: Stop | None = None,
+    alive: Callable[[], bool] = lambda: True,
 ) -> Generator[Result]:
     """Do tasks; yields results as they come.
 
@@ -60,6 +65,13 @@ def run[Task, Result](
         Makes the result of a task that could not be done, of the task and the reason.
     stop
         Looked at between results.
+    alive
+        Looked at when nothing comes: whether the executor is still there.
+
+    Raises
+    ------
+    LostError
+        If the executor takes no more tasks, or is not there.
     """
     stop = stop or Stop()
     queue = iter(tasks)
@@ -74,12 +86,17 @@ def run[Task, Result](
                 except BrokenExecutor:  # a worker died between two looks
                     suspects.append(task)
                     break
+                except Exception as error:
+                    raise LostError(f"No more work can be handed out ({_reason(error)})") from None
             if not waiting and not suspects:
                 return
             if stop.asked:
                 for future in [future for future in waiting if future.cancel()]:
                     del waiting[future]
             done = wait(waiting, timeout=_PULSE, return_when=FIRST_COMPLETED).done
+            if not done and not alive():
+                waiting.clear()  # of which nothing will be heard
+                raise LostError("The scheduler is gone")
             for future in done:
                 task = waiting.pop(future)
                 try:
@@ -94,6 +111,10 @@ def run[Task, Result](
                 pool.shutdown(wait=False)
                 yield from _one_by_one(suspects, work, executor, failed, stop)
                 pool = executor()
+    except LostError:
+        with contextlib.suppress(Exception):  # nobody answers
+            pool.shutdown(wait=False)
+        raise
     finally:
         for future in waiting:
             future.cancel()
@@ -141,6 +162,8 @@ def processes(workers: int, threads: int, begin: Callable[..., None], *arguments
     def make() -> Executor:
         import multiprocessing
 
+        # For the libraries of linear algebra that workers load, which have threads of their own beside ours.
+        os.environ.setdefault("OMP_NUM_THREADS", str(threads))
         # A fork of a process with threads may hang; a fork server is as fast as a fork and has none.
         context = multiprocessing.get_context("forkserver" if os.name == "posix" else "spawn")
         if os.name == "posix":
@@ -156,8 +179,8 @@ def threads_of(workers: int) -> Callable[[], Executor]:
 
 
 @contextlib.contextmanager
-def cluster(address: str) -> Iterator[tuple[Callable[[], Executor], int]]:
-    """Give executors of a dask.distributed cluster, and how many tasks it works on at a time.
+def cluster(address: str) -> Iterator[tuple[Callable[[], Executor], int, Callable[[], bool]]]:
+    """Give executors of a dask.distributed cluster, how many tasks it works on at a time, and whether it is alive.
 
     Raises
     ------
@@ -167,9 +190,7 @@ def cluster(address: str) -> Iterator[tuple[Callable[[], Executor], int]]:
     try:
         from distributed import Client
     except ImportError:
-        raise FileError(
-            "A scheduler needs dask.distributed, which is not installed: pip install 'dyehouse[cluster]'"
-        ) from None
+        raise FileError("A scheduler needs dask.distributed, which is not installed: pip install distributed") from None
     with contextlib.ExitStack() as stack:
         try:
             client = stack.enter_context(Client(address, timeout=_REACHED))
@@ -178,7 +199,11 @@ def cluster(address: str) -> Iterator[tuple[Callable[[], Executor], int]]:
             raise FileError(
                 f"The scheduler '{address}' gives no workers ({_reason(error)}): check that it and its workers run."
             ) from None
-        yield lambda: client.get_executor(pure=False), sum(client.nthreads().values())
+        yield (
+            lambda: client.get_executor(pure=False),
+            sum(client.nthreads().values()),
+            lambda: client.status != "closed",
+        )
 
 
 def _begin(threads: int, begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:

@@ -879,8 +879,26 @@ def _convert(pixels: NDArray, dtype: DTypeLike) -> NDArray:
     return out
 
 
-_TIFF_COMPRESSIONS = ("none", "lzw", "zip", "packbits", "zstd", "lzma")
-_EXR_COMPRESSIONS = ("none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
+_COMPRESSIONS = {
+    "tiff": ("none", "lzw", "zip", "packbits", "zstd", "lzma"),
+    "exr": ("none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"),
+}
+
+
+def check_compression(path: str | Path, compression: str) -> None:
+    """Check that `write` can compress a file of this name so.
+
+    Raises
+    ------
+    FileError
+        If it cannot.
+    """
+    kind = _kind(path)
+    allowed = _COMPRESSIONS.get(kind)
+    if allowed is None:
+        raise FileError(f"'{path}' takes no compression: leave the option out, or write a TIFF or EXR.")
+    if compression.split(":")[0] not in allowed:
+        raise FileError(f"The compression '{compression}' is not known for {kind}: use {', '.join(allowed)}.")
 
 
 def _output_spec(pixels: NDArray, kind: str, path: Path, photo: Photo, quality: int, compression: str | None) -> Any:
@@ -893,15 +911,12 @@ def _output_spec(pixels: NDArray, kind: str, path: Path, photo: Photo, quality: 
     if not 1 <= quality <= 100:
         raise FileError(f"The quality {quality} is out of range: give a number from 1 to 100.")
     own = source.spec.get_string_attribute("compression") if source.spec and source.kind == kind else ""
-    if kind in ("tiff", "exr"):
-        allowed = _TIFF_COMPRESSIONS if kind == "tiff" else _EXR_COMPRESSIONS
-        if compression is not None and compression.split(":")[0] not in allowed:
-            raise FileError(f"The compression '{compression}' is not known for {kind}: use {', '.join(allowed)}.")
+    if compression is not None:
+        check_compression(path, compression)
+    if kind in _COMPRESSIONS:
         # For 8 bits, LZW packs nearly as well as zip in a quarter of the time.
         usual = "lzw" if kind == "tiff" and pixels.dtype == np.uint8 else "zip"
-        spec.attribute("Compression", compression or (own if own in allowed else usual))
-    elif compression is not None:
-        raise FileError(f"'{path}' takes no compression: leave the option out, or write a TIFF or EXR.")
+        spec.attribute("Compression", compression or (own if own in _COMPRESSIONS[kind] else usual))
 
     straight = channels == 4 and not output_premultiplied(path, photo)
     if kind == "tiff" and pixels.dtype.kind == "u" and source.associated:

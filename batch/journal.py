@@ -15,6 +15,9 @@ from ..core.errors import FileError
 # Seconds to wait for the workers of a run that has just been killed.
 _PATIENCE = 20.0
 
+# How every entry begins, also one that was cut off.
+_BEGINNING = b'{"output": '
+
 
 class Journal(Mapping[str, dict[str, Any]]):
     """The journal of one output folder, open for appending and locked against other runs.
@@ -30,7 +33,7 @@ class Journal(Mapping[str, dict[str, Any]]):
     Raises
     ------
     FileError
-        If it cannot be read or written, or another run is using it.
+        If it cannot be read or written, is something else than a journal, or another run is using it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -49,8 +52,13 @@ class Journal(Mapping[str, dict[str, Any]]):
         self._end, line = 0, b"\n"
         for line in self._file:
             with contextlib.suppress(ValueError, KeyError, TypeError):  # cut off when the machine stopped
-                self._places[json.loads(line)["output"]] = self._end
+                entry = json.loads(line)
+                if "status" in entry:
+                    self._places[entry["output"]] = self._end
             self._end += len(line)
+        if self._end and not self._places and not (line.startswith(_BEGINNING) and self._end == len(line)):
+            self._file.close()
+            raise FileError(f"'{path}' is no journal of Dyehouse: give another file, or remove it.")
         if not line.endswith(b"\n"):
             self._end += self._file.write(b"\n")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,21 +28,18 @@ def contact_sheet(rows: Sequence[Sequence[tuple[str, NDArray[np.uint8]]]], width
     -------
     (height, width, 3) uint8.
     """
-    strips = [_row(row, width) for row in rows]
-    across = max(strip.shape[1] for strip in strips)
-    padded = [np.pad(s, ((0, 0), (0, across - s.shape[1]), (0, 0)), constant_values=_PAPER) for s in strips]
-    return np.concatenate([np.full((GAP, across, 3), _PAPER, np.uint8), *padded])
-
-
-def _row(cells: Sequence[tuple[str, NDArray[np.uint8]]], width: int) -> NDArray[np.uint8]:
-    parts = []
-    for label, picture in cells:
-        small = resized(picture, width)
-        cell = np.full((small.shape[0] + LABEL + GAP, width + GAP, 3), _PAPER, np.uint8)
-        cell[: small.shape[0], GAP:] = small
-        cell[small.shape[0] : small.shape[0] + LABEL] = _text(label, width + GAP)
-        parts.append(cell)
-    return np.concatenate([*parts, np.full((parts[0].shape[0], GAP, 3), _PAPER, np.uint8)], axis=1)
+    strips = [[(label, resized(picture, width)) for label, picture in row] for row in rows]
+    heights = [strip[0][1].shape[0] + LABEL + GAP for strip in strips]
+    across = max(len(strip) for strip in strips) * (width + GAP) + GAP
+    paper = np.full((GAP + sum(heights), across, 3), _PAPER, np.uint8)
+    top = GAP
+    for strip, height in zip(strips, heights, strict=True):
+        for k, (label, picture) in enumerate(strip):
+            left, bottom = k * (width + GAP), top + picture.shape[0]
+            paper[top:bottom, left + GAP : left + GAP + width] = picture
+            paper[bottom : bottom + LABEL, left : left + GAP + width] = _text(label, width + GAP)
+        top += height
+    return paper
 
 
 def resized(picture: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
@@ -56,6 +54,7 @@ def resized(picture: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
     return np.asarray(small.get_pixels(oiio.UINT8))
 
 
+@lru_cache(maxsize=64)  # all photos of a catalog have the same colorways
 def _text(label: str, width: int) -> NDArray[np.uint8]:
     import OpenImageIO as oiio
 

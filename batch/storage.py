@@ -59,7 +59,8 @@ def listing(folder: str) -> set[str]:
 
 def glob(pattern: str) -> list[str]:
     """Paths that a pattern with ``*``, ``?`` or ``[...]`` stands for, sorted; others stand for themselves."""
-    if not any(sign in pattern for sign in "*?[") or (not is_url(pattern) and os.path.lexists(pattern)):
+    signs = "*[" if pattern.startswith(("http://", "https://")) else "*?["  # there, ? begins a query
+    if not any(sign in pattern for sign in signs) or (not is_url(pattern) and os.path.lexists(pattern)):
         return [pattern]
     if is_url(pattern):
         with _in_words(pattern):
@@ -117,6 +118,23 @@ def arriving(path: str) -> Iterator[Path]:
                 filesystem.mv(beside, inside)
 
 
+def remove(path: str) -> None:
+    """Remove a file, if it is there.
+
+    Raises
+    ------
+    FileError
+        If it is at a URL and cannot be removed.
+    """
+    if not is_url(path):
+        Path(path).unlink(missing_ok=True)
+        return
+    with _in_words(path):
+        filesystem, inside = _filesystem(path)
+        if filesystem.exists(inside):
+            filesystem.rm_file(inside)
+
+
 def digest(path: str | Path) -> str:
     """SHA-256 of a file of this machine; empty if it cannot be read."""
     try:
@@ -143,9 +161,7 @@ def _filesystem(url: str) -> tuple[Any, str]:
     try:
         from fsspec.core import url_to_fs
     except ImportError:
-        raise FileError(
-            f"'{url}' is a URL, which needs fsspec: install it with: pip install 'dyehouse[cloud]'"
-        ) from None
+        raise FileError(f"'{url}' is a URL, which needs fsspec: install it with: pip install 'fsspec[http]'") from None
     filesystem, inside = url_to_fs(url)
     return filesystem, inside
 

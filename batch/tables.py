@@ -19,6 +19,7 @@ object with the same keys and the values of a recipe file; colorways may be an o
 from __future__ import annotations
 
 import csv
+import io
 import json
 import re
 from collections.abc import Callable, Iterator
@@ -30,7 +31,7 @@ from ..core.errors import DyehouseError, FileError
 from ..core.recipe import Colorway, Recipe, Region
 from ..core.recipe_file import KEEP, Output, StoredRecipe, Unfit, converted, nearest, read_recipe, swatch_from, types_of
 from ..core.swatches import Swatch
-from .jobs import Gathering, Problem, colorways_of
+from .jobs import Gathering, Problem, Source, colorways_of
 
 _OWN = ("photo", "recipe", "colorway", "target", "colorways", "output", "color_space")
 _RECIPE = types_of(Recipe, without=("regions", "colorways")) | {"color_space": "str | None"}
@@ -82,16 +83,20 @@ class _Rows:
         self.base = base or StoredRecipe(Recipe(), folder=self.folder)
         self.text, self.failed = False, False
         self._cache: dict[Any, Any] = {}
+        self._columns: dict[tuple[str, ...], tuple[str, ...]] = {}
 
     def problem(self, row: int | None, column: str, message: str) -> None:
         self.failed = True
-        place = f"'{self.path}'" + (f", row {row}" if row else "") + (f", column '{column}'" if column else "")
-        self.gathering.problems.append(Problem(place, message.rstrip(".") + "."))
+        ended = message if message.endswith((".", "?")) else message + "."
+        self.gathering.problems.append(Problem(Source(self.path, row), ended, column))
 
     def decoded(self, data: bytes) -> list[str]:
         """Lines of text; UTF-8 with or without a byte order mark, or UTF-16 with one."""
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            return data.decode("utf-16", errors="replace").splitlines(keepends=True)
+            return list(io.StringIO(data.decode("utf-16", errors="replace"), newline=""))
+        if b"\0" in data[:4]:
+            self.problem(None, "", "this is UTF-16 without a byte order mark: save the table again as 'CSV UTF-8'")
+            return []
         lines = []
         for number, line in enumerate(data.removeprefix(b"\xef\xbb\xbf").splitlines(keepends=True), 1):
             try:
@@ -105,22 +110,24 @@ class _Rows:
 
     def csv_rows(self, lines: list[str]) -> Iterator[tuple[int, dict[str, Any]]]:
         self.text = True
-        if not lines:
+        blank = next((k for k, line in enumerate(lines) if line.strip()), 0)
+        lines = lines[blank:]
+        if not lines or (blank and self.failed):  # the names of the columns are what cannot be read
             return
         separator = max(",;\t", key=lines[0].count)
         reader = csv.reader(lines, delimiter=separator)
         try:
             header = [name.strip() for name in next(reader)]
         except csv.Error as error:
-            self.problem(1, "", f"this is not CSV ({error})")
+            self.problem(blank + 1, "", f"this is not CSV ({error})")
             return
         wrong = [k for k, name in enumerate(header) if name and (not self._known(name) or name in header[:k])]
         for k in wrong:
-            self._say_unknown(1, header[k], doubled=header[k] in header[:k])
+            self._say_unknown(blank + 1, header[k], doubled=header[k] in header[:k])
         if wrong:
             return
         try:
-            for number, cells in enumerate(reader, 2):
+            for number, cells in enumerate(reader, blank + 2):
                 if any(cell.strip() for cell in cells[len(header) :]):
                     self.problem(
                         number, "", f"there are {len(cells)} cells for {len(header)} columns: quote cells with commas"
@@ -129,7 +136,7 @@ class _Rows:
                     pairs = zip(header, cells, strict=False)
                     yield number, {name: cell.strip() for name, cell in pairs if name and cell.strip()}
         except csv.Error as error:
-            self.problem(reader.line_num, "", f"this is not CSV ({error})")
+            self.problem(blank + reader.line_num, "", f"this is not CSV ({error})")
 
     def json_rows(self, lines: list[str]) -> Iterator[tuple[int, dict[str, Any]]]:
         for number, line in enumerate(lines, 1):
@@ -164,16 +171,19 @@ class _Rows:
     def add(self, number: int, row: dict[str, Any]) -> None:
         """Ask for what a row says."""
         fine = len(self.gathering.problems)
+        photo = row.get("photo")
+        if photo is not None:
+            photo = self._value(number, "photo", "photo", photo, "str")
         stored = self._stored(number, row)
         colorways = self._colorways(number, row, stored) if stored else ()
         if len(self.gathering.problems) > fine:
             self.failed = True
         elif stored is not None:
-            photo = row.get("photo")
             # The settings are one object for all rows that share them.
             if photo is not None:
-                stored = replace(stored, photo=str(photo), folder=self.folder)
-            self.gathering.add(stored, colorways, f"'{self.path}', row {number}")
+                stored = replace(stored, photo=photo, folder=self.folder)
+            columns = self._columns.setdefault(tuple(row), tuple(row))
+            self.gathering.add(stored, colorways, Source(self.path, number, columns))
 
     def _once(self, key: Any, make: Callable[[], Any]) -> Any:
         """What `make` gives, made once for each key: tables repeat themselves."""
@@ -193,8 +203,11 @@ class _Rows:
         stored = self.base
         fine = len(self.gathering.problems)
         if "recipe" in row:
+            path = self._value(number, "recipe", "recipe", row["recipe"], "str")
+            if path is None:
+                return None
             try:
-                stored = read_recipe(self.folder / str(row["recipe"]))
+                stored = read_recipe(self.folder / path)
             except DyehouseError as error:
                 self.problem(number, "recipe", str(error))
                 return None
@@ -258,6 +271,9 @@ class _Rows:
         targets = {k: v for k, v in row.items() if k.partition(".")[0] == "target"}
         own = {colorway.name: colorway for colorway in stored.recipe.colorways}
         name, several = row.get("colorway"), row.get("colorways")
+        if name is not None and not isinstance(name, str | int | float):
+            self.problem(number, "colorway", f"'{name}' is no name: write a text in quotes")
+            return ()
         if several is not None and (targets or name is not None):
             self.problem(number, "colorways", "this is given beside a colorway or target: give one or the other")
         elif targets:
@@ -297,8 +313,10 @@ class _Rows:
         for item in several:
             if isinstance(item, tuple):
                 found += self._defined(number, str(item[0]), item[1], stored)
+            elif isinstance(item, str):
+                found += self._named(number, "colorways", [item], own)
             else:
-                found += self._named(number, "colorways", [str(item)], own)
+                self.problem(number, "colorways", f"'{item}' is no name: write names, or an object of names and colors")
         return tuple(found)
 
     def _defined(self, number: int, name: str, value: Any, stored: StoredRecipe) -> list[Colorway]:

@@ -8,8 +8,9 @@ decides which pixels these are, so the area is chosen before the photo's pixels 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,9 @@ from ..core.reference import check_pixel, read_window, trimmed_mean, window_radi
 from ..core.swatches import Camera, Light, Swatch
 from . import files
 
-# Pixels that are looked at for matte ones, and how near to the reference these are: A around 1, and the rest of every
-# channel (gloss, residual) as a share of the reference.
-_CANDIDATES = 20_000
+# Pixels that are looked at for matte ones at most, and at a time; and how near to the reference these are: A around 1,
+# and the rest of every channel (gloss, residual) as a share of the reference.
+_CANDIDATES, _AT_ONCE = 80_000, 4_000
 _BODY, _OFF = 0.2, 0.1
 
 # Pixels that are averaged, and how many times as many they are chosen from.
@@ -58,21 +59,23 @@ class Verification:
     limit: float
     pixels: int
 
-    @property
+    @cached_property
     def ciede2000(self) -> float:
         """CIEDE2000 between asked and delivered."""
         return float(colorimetry.delta_e_2000(self.asked, self.delivered))
 
-    def cmc(self, lightness: float) -> float:
-        """CMC(l:1) of delivered against asked: 2 for acceptability, 1 for perceptibility."""
-        return float(colorimetry.delta_e_cmc(self.asked, self.delivered, lightness))
+    @cached_property
+    def cmc(self) -> tuple[float, float]:
+        """CMC(2:1), for acceptability, and CMC(1:1), for perceptibility, of delivered against asked."""
+        acceptable, perceptible = colorimetry.delta_e_cmc(self.asked, self.delivered, np.array([2.0, 1.0])).tolist()
+        return acceptable, perceptible
 
     @property
     def sentence(self) -> str:
         """The figures in words."""
         text = (
             f"Delivered {self.ciede2000:.1f} of the asked color (CIEDE2000 {self.ciede2000:.2f}, CMC(2:1) "
-            f"{self.cmc(2):.2f}, CMC(1:1) {self.cmc(1):.2f}; {self.pixels} matte pixels)"
+            f"{self.cmc[0]:.2f}, CMC(1:1) {self.cmc[1]:.2f}; {self.pixels} matte pixels)"
         )
         if self.limit > 0:
             text += f"; the nearest color that the file can hold is {self.limit:.1f} away"
@@ -85,8 +88,8 @@ class Verification:
             "asked_lab": self.asked.tolist(),
             "delivered_lab": self.delivered.tolist(),
             "ciede2000": self.ciede2000,
-            "cmc_2_1": self.cmc(2),
-            "cmc_1_1": self.cmc(1),
+            "cmc_2_1": self.cmc[0],
+            "cmc_1_1": self.cmc[1],
             "limit_ciede2000": self.limit,
             "pixels": self.pixels,
             "sentence": self.sentence,
@@ -172,8 +175,13 @@ def _verification(
     target: str | None, asked: NDArray, delivered: NDArray, back: files.Photo, pixels: int
 ) -> Verification:
     asked_lab, delivered_lab = (colorimetry.linear_to_lab(color, back.space) for color in (asked, delivered))
-    limit = float(gamut.nearest(asked, back.space).difference) if back.pixels.dtype.kind == "u" else 0.0
+    limit = _limit(tuple(asked), back.space) if back.pixels.dtype.kind == "u" else 0.0
     return Verification(target, asked_lab, delivered_lab, limit, pixels)
+
+
+@lru_cache(maxsize=64)  # all photos of a catalog have the same targets
+def _limit(asked: tuple[float, ...], space: RGBSpace) -> float:
+    return float(gamut.nearest(asked, space).difference)
 
 
 def expect(
@@ -213,40 +221,53 @@ def _matte_area(analysis: Analysis, covers: Sequence[NDArray | None], alpha: NDA
     """Pixels of the region that look like its reference."""
     if any(cover is None for cover in covers):
         return None  # another region lies over all of it
-    picture = analysis.picture
-    rows, columns = _candidates(analysis)
-    keep = np.ones(len(rows), bool)
-    if analysis.mask is not None:
-        keep &= as_weights(analysis.mask[rows, columns]) == 1
-    for cover in covers:
-        keep &= as_weights(np.asarray(cover)[rows, columns]) == 0
-    if alpha is not None:
-        keep &= alpha[rows, columns] == (np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1)
-    rows, columns = rows[keep], columns[keep]
-    pixels = picture.at(rows, columns)
-    unclipped = pixels.max(axis=1, initial=0) < picture.clip_level
-    rows, columns, pixels = rows[unclipped], columns[unclipped], pixels[unclipped]
-    if not len(rows):
+    # From the top to the bottom until there are enough, so that not all of a file need be decoded.
+    found, near = [], 0
+    for part in _grids(analysis):
+        pixels, *places = _clear_pixels(analysis, covers, alpha, part)
+        body, gloss, unlike = _compared(pixels, analysis)
+        found.append((*places, body, gloss, unlike))
+        near += int(np.count_nonzero(unlike < 1))
+        if near >= _CHOICE * _MOST:
+            break
+    if not found:
         return None
-    # The plain model chooses them, whatever the photo is recolored by: where it fits, all models agree.
-    V, W = analysis.reference, analysis.white
-    model = "dichromatic" if stability.noise_gain(V, W) < LARGEST_NOISE_GAIN else "body"
-    body, gloss = dichromatic.fit(pixels, V, W, model)
-    # Channel by channel, as a weak channel of the old color may be a strong one of the new.
-    off = np.abs(pixels - body[:, None] * V) / np.maximum(np.abs(V), 0.02 * np.abs(V).max())
-    unlike = np.maximum(np.abs(body - 1) / _BODY, off.max(axis=1) / _OFF)
-    # The color of a product varies, and the reference is one of its colors: the nearest ones, of the first rows that
-    # have enough of them, so that not all of the file need be decoded.
-    near = np.flatnonzero(unlike < 1)[: _CHOICE * _MOST]
-    if len(near) < _FEWEST:
-        near = np.argsort(unlike, kind="stable")[:_FEWEST]
-    alike = near[np.argsort(unlike[near], kind="stable")[:_MOST]]
+    rows, columns, body, gloss, unlike = (np.concatenate(values) for values in zip(*found, strict=True))
+    # The color of a product varies, and the reference is one of its colors: the nearest ones.
+    alike = np.argsort(unlike, kind="stable")[: min(max(near, _FEWEST), _MOST)]
     alike = alike[body[alike] > 0.1]
     return Area(rows[alike], columns[alike], body[alike], gloss[alike]) if len(alike) else None
 
 
-def _candidates(analysis: Analysis) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pixels around the reference pixel, or on a grid over the region."""
+def _clear_pixels(
+    analysis: Analysis, covers: Sequence[NDArray | None], alpha: NDArray | None, part: tuple[slice, slice]
+) -> tuple[NDArray[np.float32], NDArray[np.intp], NDArray[np.intp]]:
+    """(n, 3) linear RGB, and rows and columns, of a part's pixels that are of the region alone and not clipped."""
+    linear = analysis.picture.linear(*part)
+    keep = linear.max(axis=2) < analysis.picture.clip_level
+    if analysis.mask is not None:
+        keep &= as_weights(analysis.mask[part]) == 1
+    for cover in covers:
+        keep &= as_weights(np.asarray(cover)[part]) == 0
+    if alpha is not None:
+        keep &= alpha[part] == (np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1)
+    rows, columns = (s.start + s.step * places for s, places in zip(part, np.nonzero(keep), strict=True))
+    return linear[keep], rows, columns
+
+
+def _compared(pixels: NDArray[np.float32], analysis: Analysis) -> tuple[NDArray, NDArray, NDArray]:
+    """A and B of (n, 3) pixels, and how unlike the reference they are: under 1 is near."""
+    V, W = analysis.reference, analysis.white
+    # The plain model chooses them, whatever the photo is recolored by: where it fits, all models agree.
+    model = "dichromatic" if stability.noise_gain(V, W) < LARGEST_NOISE_GAIN else "body"
+    body, gloss = dichromatic.fit(pixels, V, W, model)
+    # Channel by channel, as a weak channel of the old color may be a strong one of the new.
+    off = np.abs(pixels - body[:, None] * V) / np.maximum(np.abs(V), 0.02 * np.abs(V).max())
+    return body, gloss, np.maximum(np.abs(body - 1) / _BODY, off.max(axis=1) / _OFF)
+
+
+def _grids(analysis: Analysis) -> Iterator[tuple[slice, slice]]:
+    """Rows and columns of grids that lie below one another, around the reference pixel or all over the region."""
     height, width = analysis.picture.shape
     if analysis.pixel is not None:
         x, y = analysis.pixel
@@ -254,10 +275,11 @@ def _candidates(analysis: Analysis) -> tuple[NDArray[np.intp], NDArray[np.intp]]
         box = slice(max(0, y - reach), min(height, y + reach + 1)), slice(max(0, x - reach), min(width, x + reach + 1))
     else:
         box = RegionMatrix(np.eye(3), analysis.mask).box or (slice(0, height), slice(0, width))
-    area = (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
-    step = max(1, int(np.sqrt(area / _CANDIDATES)))
-    rows, columns = np.mgrid[box[0].start : box[0].stop : step, box[1].start : box[1].stop : step]
-    return rows.ravel(), columns.ravel()
+    rows, columns = ((side.start, side.stop) for side in box)
+    step = max(1, int(np.sqrt((rows[1] - rows[0]) * (columns[1] - columns[0]) / _CANDIDATES)))
+    tall = step * max(1, _AT_ONCE * step // max(1, columns[1] - columns[0]))
+    for top in range(*rows, tall):
+        yield slice(top, min(top + tall, rows[1]), step), slice(*columns, step)
 
 
 def verify(

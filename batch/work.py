@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import time
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..core.colorspace import space_named
 from ..core.errors import DyehouseError, FileError
-from ..core.recipe import Colorway, Prepared
+from ..core.recipe import Prepared
 from ..core.recipe_file import measured
 from ..core.thumbnail import proxy_of, thumbnail
 from . import files, inspection, journal, photo, sheet, storage, verification
@@ -110,7 +111,7 @@ def _entry(job: Job, want: Want, status: str) -> Entry:
         "status": status,
         "photo": job.photo,
         "colorway": want.colorway.name,
-        "source": want.source,
+        "source": str(want.source),
     }
 
 
@@ -120,9 +121,10 @@ def _perform(task: Task) -> list[Entry]:
         places = {path: stack.enter_context(storage.local(path)) for path in job.inputs}
         digests = {path: storage.digest(place) for path, place in places.items()}
         inputs = hashlib.sha256("".join(digests.values()).encode()).hexdigest()
-        due = [want for want in job.wants if not _done(task, want.output, inputs, _settings(task, want))]
-        sheet_settings = hashlib.sha256("".join(_settings(task, want) for want in job.wants).encode()).hexdigest()
-        sheet_due = task.sheets and not _done(task, job.sheet, inputs, sheet_settings)
+        settings = {want.output: _settings(task, want) for want in job.wants}
+        settings[job.sheet] = hashlib.sha256("".join(settings.values()).encode()).hexdigest()
+        due = [want for want in job.wants if not _done(task, want.output, inputs, settings[want.output])]
+        sheet_due = task.sheets and not _done(task, job.sheet, inputs, settings[job.sheet])
         if not due and not sheet_due:
             return [task.known[want.output] | {"status": "kept"} for want in job.wants]
         try:
@@ -134,8 +136,8 @@ def _perform(task: Task) -> list[Entry]:
             return failures(task, said)
     for entry in entries:
         entry["input"] = inputs
-        if entry["status"] == "sheet":
-            entry["settings"] = sheet_settings
+        if "sha256" in entry:
+            entry["settings"] = settings[entry["output"]]
     return entries
 
 
@@ -161,18 +163,11 @@ def _recolored(
     fetched: dict[str, Any] = {name: str(places[path]) for name, path in measured(job.recipe).items()}
     recipe = replace(job.recipe, **fetched, colorways=tuple(want.colorway for want in job.wants))
     prepared = photo.look(opened, recipe, read_mask=lambda name: _mask(places[name], digests[name], opened))
-    proxy = proxy_of(prepared, _WIDEST) if sheet_due else None
-    cells = []
-    if proxy is not None:
-        same = Colorway("", (None,) * len(recipe.regions))
-        unlit = replace(prepared, target_white=prepared.white)
-        cells.append(("photo", thumbnail(proxy, unlit.for_colorway(same))))
+    owns = [prepared.for_colorway(want.colorway) for want in job.wants]
+    cells = small_pictures(prepared, owns, job.wants) if sheet_due else []
     entries = []
     shared = _Shared(opened, prepared, task.verify) if due else None
-    for want in job.wants:
-        own = prepared.for_colorway(want.colorway)
-        if proxy is not None:
-            cells.append((want.colorway.name, thumbnail(proxy, own)))
+    for want, own in zip(job.wants, owns, strict=True):
         if shared is None or want not in due:
             entries.append(task.known[want.output] | {"status": "kept"})
             continue
@@ -185,6 +180,15 @@ def _recolored(
     if cells:
         entries.append(_sheet(task, cells))
     return entries
+
+
+def small_pictures(
+    prepared: Prepared, owns: Sequence[Prepared], wants: Sequence[Want]
+) -> list[tuple[str, NDArray[np.uint8]]]:
+    """Labels and pictures for a contact sheet: the photo, and each of its colorways."""
+    proxy = proxy_of(prepared, _WIDEST)
+    made = [(want.colorway.name, thumbnail(proxy, own)) for want, own in zip(wants, owns, strict=True)]
+    return [("photo", proxy.codes), *made]
 
 
 def _mask(place: Path, digest: str, opened: files.Photo) -> NDArray:
@@ -239,11 +243,11 @@ def _written(task: Task, want: Want, shared: _Shared, own: Prepared) -> Entry:
         )
         digest = storage.digest(written)
         delivered = [] if expected is None else [check.as_dict() for check in expected.check(written)]
-    _remove_other(task, want, file)
+    # An earlier run may have come to another opinion.
+    storage.remove(storage.join(task.out, want.output if reason else f"{ASIDE}/{want.output}"))
     entry = _entry(task.job, want, "needs a person" if reason else "done")
     return entry | {
         "file": file,
-        "settings": _settings(task, want),
         "sha256": digest,
         "model": [analysis.model for analysis in own.analyses],
         "predicted_error": error,
@@ -285,13 +289,6 @@ def _place(out: str, file: str) -> str:
         if not inside:
             raise FileError(f"'{place}' leads out of the output folder by a link: remove the link.")
     return place
-
-
-def _remove_other(task: Task, want: Want, file: str) -> None:
-    """Remove what an earlier run made of the same result in the other place."""
-    before = task.known.get(want.output, {}).get("file", file)
-    if before != file and not storage.is_url(task.out):
-        Path(storage.join(task.out, before)).unlink(missing_ok=True)
 
 
 def _sheet(task: Task, cells: list[tuple[str, NDArray[np.uint8]]]) -> Entry:

@@ -35,7 +35,6 @@ from ..batch.catalog import Run, Settings
 from ..batch.jobs import Job, gather
 from ..core import transfer
 from ..core.colorspace import SRGB
-from ..core.thumbnail import proxy_of, thumbnail
 from .speed import test_picture
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "catalog_speed.md"
@@ -50,12 +49,12 @@ def photos(folder: Path, count: int, size: tuple[int, int] = SIZE) -> None:
     linear = test_picture(*size)
     rng = np.random.default_rng(2)
     for k in range(count):
-        exposed = np.roll(linear, 2 * (k % 5), axis=1) * np.float32(1 - 0.001 * k % 0.2)
+        exposed = linear * np.float32(1 - 0.001 * k % 0.2)
         codes = transfer.encode(exposed, SRGB.curve, np.uint8)
         picture = (codes + rng.integers(-1, 2, codes.shape)).clip(0, 255).astype(np.uint8)
         files.write(folder / f"photo{k:04}.jpg", picture, files.Photo(Path(), picture, SRGB))
     y, x = np.mgrid[0 : size[0], 0 : size[1]]
-    inside = ((x / size[1] - 0.5) / 0.36) ** 2 + ((y / size[0] - 0.5) / 0.4) ** 2 < 1
+    inside = ((x / size[1] - 0.5) / 0.38) ** 2 + ((y / size[0] - 0.5) / 0.42) ** 2 < 1  # as in `test_picture`
     mask = np.repeat(inside[..., None], 3, axis=2).astype(np.uint8) * np.uint8(255)
     files.write(folder / "mask.png", mask, files.Photo(Path(), mask, SRGB))
 
@@ -329,17 +328,16 @@ def stages(job: Job, out: Path) -> dict[str, float]:
         assert analysis.mask is not None
     with timed("correction maps"):
         assert analysis.extra is None or analysis.extra.any()
+    owns = [prepared.for_colorway(want.colorway) for want in job.wants]
     with timed("contact sheet"):
-        proxy = proxy_of(prepared, 360)
+        cells = work.small_pictures(prepared, owns, job.wants)
     with timed("recolor"):
         palette = photo.palette(prepared)
     with timed("verify"):
         areas = verification.matte_areas(opened, prepared)
-    cells, room = [], np.empty_like(opened.pixels)
-    for want in job.wants:
-        own, path = prepared.for_colorway(want.colorway), out / want.output
-        with timed("contact sheet"):
-            cells.append((want.colorway.name, thumbnail(proxy, own)))
+    room = np.empty_like(opened.pixels)
+    for want, own in zip(job.wants, owns, strict=True):
+        path = out / want.output
         with timed("predict the error"):
             assert own.predictions
         with timed("recolor"):
@@ -351,8 +349,9 @@ def stages(job: Job, out: Path) -> dict[str, float]:
         with timed("verify"):
             verification.expect(opened, own, areas=areas).check(path)
     with timed("contact sheet"):
-        picture = sheet.contact_sheet([cells], cells[0][1].shape[1])
-        files.write(out / "sheet.jpg", picture, files.Photo(Path(), picture, SRGB), force=True)
+        rows = [cells[k : k + work.ACROSS] for k in range(0, len(cells), work.ACROSS)]
+        picture = sheet.contact_sheet(rows, cells[0][1].shape[1])
+        files.write(out / "sheet.jpg", picture, files.Photo(Path(), picture, SRGB), force=True, quality=88)
     with timed("hashes"):
         storage.digest(Path(job.photo))
     return taken

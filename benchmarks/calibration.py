@@ -73,7 +73,7 @@ class Case:
     target: str
     camera: str
     model: str
-    parts: Mapping[str, NDArray[np.float64]]
+    parts: Mapping[str, NDArray[np.float32]]
     errors: NDArray[np.float64]
     flagged: bool
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import confidence, dichromatic, maps, stability
 from . import recolor as recoloring
-from .compositing import Edge, refine_outline, rim_left_out, spill_weights
+from .compositing import Edge, Sides, add_spill, refine_outline, rim_left_out, spill_weights
 from .errors import ImageError, ReferenceColorError, WhiteError
 from .materials import find_materials
 from .mixture import MODELS as _MODELS
@@ -185,7 +185,13 @@ class Analysis:
         if self.selection is None:
             return None, None
         splits, seen = self.evidence.mixture.keeps_white, (self.picture, self.selection, self.reference, self.white)
-        return refine_outline(*seen, splits=splits, spill=spill_weights(*seen) if self.spill and splits else None)
+        # Metal mirrors, and throws no light of its color around.
+        spill = spill_weights(*seen) if self.spill and self.model != "metal" else None
+        sides = self.__dict__.pop("_sides", None)
+        if splits or spill is None:
+            return refine_outline(*seen, splits=splits, spill=spill, sides=sides)
+        outline = refine_outline(*seen, splits=False, sides=sides)
+        return add_spill(self.picture, *outline, spill, self.reference, self.white)
 
     @property
     def mask(self) -> NDArray | None:
@@ -266,29 +272,30 @@ class Analysis:
         target, target_white
             As for :meth:`matrix`.
         """
-        prediction = self.doubt(target, target_white).predict(*self._looked_at)
+        prediction = self.doubt(target, target_white).predict(self._sample)
         return replace(prediction, warnings=(*prediction.warnings, *self.warnings))
 
     def doubt(self, target: ArrayLike, target_white: ArrayLike | None = None) -> confidence.Doubt:
         """What the prediction for one target is made from."""
         white = self.white if target_white is None else dichromatic.as_white(target_white)
-        v, e = dichromatic.as_target(target), self.evidence
+        v = dichromatic.as_target(target)
+        return confidence.Doubt(self._grounds, self.matrix(v, white), v, white)
+
+    @cached_property
+    def _grounds(self) -> confidence.Grounds:
+        """What makes predictions uncertain, for all targets."""
+        e = self.evidence
         noise = e.noise if e.noise.read else noise_across(self.picture, self.reference, self.white)
-        return confidence.Doubt(
-            self.picture,
-            self.extra,
-            self.mixture,
-            self.matrix(v, white),
-            v,
-            white,
-            noise,
-            self.noise_gain,
-            e.figures.get("split_noise", 0.0),
-            e.hidden,
-            e.other,
+        split_noise = e.figures.get("split_noise", 0.0)
+        return confidence.Grounds(
+            self.picture, self.extra, self.mixture, noise, self.noise_gain, split_noise, e.hidden, e.other
         )
 
     @cached_property
+    def _sample(self) -> confidence.Sample:
+        """Pixels that are to stand for the region."""
+        return self._grounds.sample(*self._looked_at())
+
     def _looked_at(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Rows and columns of pixels all over the region, well inside it."""
         height, width = self.picture.shape
@@ -408,9 +415,13 @@ def analyze(
         + _region_warnings(picture, m)
         + _material_warnings(picture, w, m)
     )
+    sides = None
     if m is not None and not spill:
-        warnings += _rim_warnings(rim_left_out(picture, m, found.color, w))
-    return Analysis(picture, w, found.color, found.pixel, m, evidence, gain, tuple(warnings), found.gloss, spill)
+        sides = Sides.of(m)
+        warnings += _rim_warnings(rim_left_out(picture, sides, found.color, w))
+    made = Analysis(picture, w, found.color, found.pixel, m, evidence, gain, tuple(warnings), found.gloss, spill)
+    made.__dict__["_sides"] = sides  # until the outline is found
+    return made
 
 
 def _look(

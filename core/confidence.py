@@ -104,8 +104,30 @@ class Prediction:
 
 
 @dataclass(frozen=True, eq=False)
-class Doubt:
-    """All that the prediction for one target is made from.
+class Sample:
+    """Some pixels of a region, and what each may depart from the model by: the same for every target.
+
+    Attributes
+    ----------
+    given
+        (n, 3 + m) float32 pixels with their corrections.
+    recolored
+        (7, n, 3) float32 changes of the pixel that are recolored with it: noise and reference by channel, body.
+    left
+        (2, n, 3) float32 changes that shall stay what they are: residual, hue.
+    grain
+        (n, 1) float32 gloss of the pixel beyond that of its neighborhood.
+    """
+
+    given: NDArray[np.float32]
+    recolored: NDArray[np.float32]
+    left: NDArray[np.float32]
+    grain: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Grounds:
+    """What makes predictions of a region uncertain, whatever its target.
 
     Attributes
     ----------
@@ -115,12 +137,6 @@ class Doubt:
         (height, width, n) corrections, or None.
     mixture
         The model.
-    matrix
-        (3, 3 + n) of the recolor.
-    target
-        (3,) V'.
-    target_white
-        (3,) W'.
     noise
         Of the color, relative to the white.
     noise_gain
@@ -136,14 +152,41 @@ class Doubt:
     picture: Picture
     extra: NDArray | None
     mixture: Mixture
-    matrix: NDArray[np.float64]
-    target: NDArray[np.float64]
-    target_white: NDArray[np.float64]
     noise: Noise
     noise_gain: float
     split_noise: float = 0.0
     hidden: bool = False
     other: Mixture | None = None
+
+    @cached_property
+    def colored(self) -> bool:
+        """Whether there is a plane of body and white."""
+        return bool(dichromatic.sine(self.mixture.body, self.mixture.white) > _FLAT)
+
+    @property
+    def splits(self) -> bool:
+        """Whether body and gloss can be told apart."""
+        return self.colored and self.noise_gain < _GRAY_GAIN
+
+    def sample(self, rows: NDArray, columns: NDArray) -> Sample:
+        """Look at n pixels."""
+        white = self.mixture.white
+        pixels = self.picture.at(rows, columns).astype(np.float64)
+        given = pixels
+        if self.extra is not None:
+            given = np.hstack([pixels, self.extra[rows, columns].astype(np.float64)])
+        body, toward, normal = self._axes
+        light = (pixels / white) @ body
+        color = self.mixture.body / white
+        sigma = np.hypot(self.noise.at(light)[:, None], self._step(pixels) / white)
+        wrong = np.hypot(self.noise.at(color @ body), self._step(self.mixture.body[None])[0] / white)
+        strength = (light / (color @ body))[:, None]
+        off = np.linalg.norm((given @ self.mixture.left_over.T) / white, axis=1, keepdims=True)
+        axes = np.eye(3)[:, None]
+        recolored = np.concatenate([sigma * axes, strength * wrong * axes, (_SMALL * pixels / white)[None]]) * white
+        left = np.stack([off * toward, _SMALL * light[:, None] * normal]) * white
+        grain = self._grain(rows, columns) if self.splits else np.zeros((len(rows), 1))
+        return Sample(*(_float32(values) for values in (given, recolored, left, grain)))
 
     @cached_property
     def _axes(self) -> tuple[NDArray, NDArray, NDArray]:
@@ -157,95 +200,6 @@ class Doubt:
         toward = toward / np.linalg.norm(toward)
         return body, toward, np.cross(body, toward)
 
-    @property
-    def _colored(self) -> bool:
-        return bool(dichromatic.sine(self.mixture.body, self.mixture.white) > _FLAT)
-
-    def parts(self, rows: NDArray, columns: NDArray) -> dict[str, NDArray[np.float64]]:
-        """(n,) CIEDE2000 at n pixels, of every way to depart from the model; names as in `WEIGHTS`."""
-        white, matrix = self.mixture.white, self.matrix[:, :3]
-        pixels = self.picture.at(rows, columns).astype(np.float64)
-        given = self._given(pixels, rows, columns)
-        result = given @ self.matrix.T
-        seen = self._lab(result)
-
-        body, toward, normal = self._axes
-        light = (pixels / white) @ body
-        color = self.mixture.body / white
-        sigma = np.hypot(self.noise.at(light)[:, None], self._step(pixels) / white)
-        wrong = np.hypot(self.noise.at(color @ body), self._step(self.mixture.body[None])[0] / white)
-        strength = (light / (color @ body))[:, None]
-        left = np.linalg.norm((given @ self.mixture.left_over.T) / white, axis=1, keepdims=True)
-        axes = np.eye(3)[:, None]
-        # What changes of the white-balanced pixel do to the color; and what those do that shall stay what they are.
-        through = np.concatenate([sigma * axes, strength * wrong * axes, (_SMALL * pixels / white)[None]])
-        beyond = np.stack([left * toward, _SMALL * light[:, None] * normal])
-        moved = np.concatenate([(through * white) @ matrix.T, (beyond * white) @ (matrix - np.eye(3)).T])
-        differences = delta_e_2000(self._lab(result + moved), seen)
-        found = {
-            "noise": np.linalg.norm(differences[:3], axis=0),
-            "reference": np.linalg.norm(differences[3:6], axis=0),
-            "residual": differences[7],
-            "body": differences[6],
-            "hue": differences[8],
-        }
-        lost = _USUAL_GLOSS * (self.target_white - matrix @ white)
-        hidden = min(1.0, self.split_noise) if self._colored else 1.0
-        found["gray"] = hidden * delta_e_2000(self._lab(result + lost), seen)
-        found |= {"grain": np.zeros(len(rows)), "lights": np.zeros(len(rows))}
-        if self._colored and self.noise_gain < _GRAY_GAIN:
-            found["grain"] = delta_e_2000(self._lab(result + self._grain(rows, columns) * self.target_white), seen)
-        if self.mixture.model == "lights" or self.other is not None:
-            found["lights"] = self.disagreement(rows, columns)
-        return found
-
-    def disagreement(self, rows: NDArray, columns: NDArray) -> NDArray[np.float64]:
-        """(n,) CIEDE2000 between the model and the other, or the plain one; 0 where the plain one is of no use."""
-        if not self._colored or self.noise_gain >= _GRAY_GAIN:
-            return np.zeros(len(rows))
-        pixels = self.picture.at(rows, columns).astype(np.float64)
-        if self.other is None:
-            plain = dichromatic.recolor_matrix(self.mixture.body, self.target, self.mixture.white, self.target_white)
-        else:
-            plain = self.other.matrix(self.target, self.target_white, 0.0)
-        return delta_e_2000(self._lab(pixels @ plain.T), self._lab(self._given(pixels, rows, columns) @ self.matrix.T))
-
-    def predict(self, rows: NDArray, columns: NDArray) -> Prediction:
-        """What to expect of the region that these pixels are a sample of."""
-        parts = self.parts(rows, columns)
-        errors = _together(parts, WEIGHTS)
-        median, bound = float(np.median(errors)), REGION_BOUND * float(np.quantile(errors, 0.9))
-        overruled = self.mixture.model in ("metal", "lights") and (
-            float(np.median(self.disagreement(rows, columns))) > FLAG_MODEL
-        )
-        said = []
-        if median > FLAG:
-            worst = max(parts, key=lambda name: WEIGHTS[name] * float(np.median(parts[name])))
-            said.append(
-                f"The color will probably be off by about {median:.1f} CIEDE2000 (90 % of the product within "
-                f"{bound:.0f}): {_REMEDIES[worst]}."
-            )
-        elif overruled:
-            what = "metal" if self.mixture.model == "metal" else "lit by two lights"
-            said.append(
-                f"The result depends on whether the product is really {what}: compare the model 'dichromatic', or "
-                "check a sample."
-            )
-        elif self.hidden:
-            said.append(
-                "Noise hides why the product departs from body color and gloss, by light of more than one color or as "
-                "metal does: use a longer exposure, or check a sample."
-            )
-        return Prediction(median, bound, bool(said), tuple(said))
-
-    def errors(self, rows: NDArray, columns: NDArray, weights: Mapping[str, float] = WEIGHTS) -> NDArray[np.float64]:
-        """(n,) predicted CIEDE2000 at n pixels."""
-        return _together(self.parts(rows, columns), weights)
-
-    def _given(self, pixels: NDArray, rows: NDArray, columns: NDArray) -> NDArray[np.float64]:
-        """(n, 3 + m) pixels with their corrections."""
-        return pixels if self.extra is None else np.hstack([pixels, self.extra[rows, columns].astype(np.float64)])
-
     def _step(self, pixels: NDArray) -> NDArray[np.float64]:
         """(n, 3) linear light of one code; 0 for pictures of floats."""
         stored = self.picture.pixels.dtype
@@ -256,15 +210,10 @@ class Doubt:
             pixels, 0, 1
         )
 
-    def _lab(self, pixels: NDArray) -> NDArray:
-        # In white-balanced Rec.709 whatever the photo's primaries: it is an estimate.
-        return linear_to_lab(pixels / self.target_white, LINEAR_SRGB)
-
     def _grain(self, rows: NDArray, columns: NDArray) -> NDArray[np.float64]:
         """(n, 1) gloss of pixels beyond that of their neighborhood."""
         height, width = self.picture.shape
-        white = self.mixture.white
-        split = dichromatic.projector(self.mixture.body, white)
+        split = dichromatic.projector(self.mixture.body, self.mixture.white)
 
         def coefficients(down: int, right: int) -> NDArray:
             at = np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)
@@ -276,5 +225,110 @@ class Doubt:
         return np.abs(here[:, 1] - share * np.maximum(here[:, 0], 0))[:, None]
 
 
-def _together(parts: Mapping[str, NDArray[np.float64]], weights: Mapping[str, float]) -> NDArray[np.float64]:
+@dataclass(frozen=True, eq=False)
+class Doubt:
+    """All that the prediction for one target is made from.
+
+    Attributes
+    ----------
+    grounds
+        What does not depend on it.
+    matrix
+        (3, 3 + n) of the recolor.
+    target
+        (3,) V'.
+    target_white
+        (3,) W'.
+    """
+
+    grounds: Grounds
+    matrix: NDArray[np.float64]
+    target: NDArray[np.float64]
+    target_white: NDArray[np.float64]
+
+    def parts(self, rows: NDArray, columns: NDArray) -> dict[str, NDArray[np.float32]]:
+        """(n,) CIEDE2000 at n pixels, of every way to depart from the model; names as in `WEIGHTS`."""
+        return self._parts(self.grounds.sample(rows, columns))
+
+    def _parts(self, seen: Sample) -> dict[str, NDArray[np.float32]]:
+        grounds, matrix = self.grounds, self.matrix[:, :3]
+        result = seen.given @ _float32(self.matrix.T)
+        lost = _USUAL_GLOSS * (self.target_white - matrix @ grounds.mixture.white)
+        differences = self._difference(
+            result,
+            result + seen.recolored @ _float32(matrix.T),
+            result + seen.left @ _float32(matrix.T - np.eye(3)),
+            (result + _float32(lost))[None],
+            (result + seen.grain * _float32(self.target_white))[None],
+        )
+        found = {
+            "noise": np.linalg.norm(differences[:3], axis=0),
+            "reference": np.linalg.norm(differences[3:6], axis=0),
+            "body": differences[6],
+            "residual": differences[7],
+            "hue": differences[8],
+            "gray": differences[9] * np.float32(min(1.0, grounds.split_noise) if grounds.colored else 1.0),
+            "grain": differences[10],
+            "lights": np.zeros(len(result), np.float32),
+        }
+        if grounds.mixture.model == "lights" or grounds.other is not None:
+            found["lights"] = self._disagreement(seen)
+        return found
+
+    def _disagreement(self, seen: Sample) -> NDArray[np.float32]:
+        """(n,) CIEDE2000 between the model and the other, or the plain one; 0 where the plain one is of no use."""
+        grounds, mixture = self.grounds, self.grounds.mixture
+        if not grounds.splits:
+            return np.zeros(len(seen.given), np.float32)
+        if grounds.other is None:
+            other = dichromatic.recolor_matrix(mixture.body, self.target, mixture.white, self.target_white)
+        else:
+            other = grounds.other.matrix(self.target, self.target_white, 0.0)
+        made = seen.given @ _float32(self.matrix.T)
+        return self._difference(made, (seen.given[:, :3] @ _float32(other.T))[None])[0]
+
+    def predict(self, seen: Sample) -> Prediction:
+        """What to expect of the region that these pixels are a sample of."""
+        parts = self._parts(seen)
+        errors = _together(parts, WEIGHTS)
+        median, most = (float(error) for error in np.quantile(errors, (0.5, 0.9)))
+        bound = REGION_BOUND * most
+        model = self.grounds.mixture.model
+        overruled = model in ("metal", "lights") and float(np.median(self._disagreement(seen))) > FLAG_MODEL
+        said = []
+        if median > FLAG:
+            worst = max(parts, key=lambda name: WEIGHTS[name] * float(np.median(parts[name])))
+            said.append(
+                f"The color will probably be off by about {median:.1f} CIEDE2000 (90 % of the product within "
+                f"{bound:.0f}): {_REMEDIES[worst]}."
+            )
+        elif overruled:
+            what = "metal" if model == "metal" else "lit by two lights"
+            said.append(
+                f"The result depends on whether the product is really {what}: compare the model 'dichromatic', or "
+                "check a sample."
+            )
+        elif self.grounds.hidden:
+            said.append(
+                "Noise hides why the product departs from body color and gloss, by light of more than one color or as "
+                "metal does: use a longer exposure, or check a sample."
+            )
+        return Prediction(median, bound, bool(said), tuple(said))
+
+    def errors(self, rows: NDArray, columns: NDArray, weights: Mapping[str, float] = WEIGHTS) -> NDArray[np.float32]:
+        """(n,) predicted CIEDE2000 at n pixels."""
+        return _together(self.parts(rows, columns), weights)
+
+    def _difference(self, result: NDArray, *others: NDArray) -> NDArray[np.float32]:
+        """(m, n) CIEDE2000 of (n, 3) pixels from (m, n, 3) others, of which there may be several arrays."""
+        # In white-balanced Rec.709 whatever the photo's primaries: it is an estimate.
+        lab = linear_to_lab(np.concatenate([result[None], *others]) / _float32(self.target_white), LINEAR_SRGB)
+        return delta_e_2000(lab[1:], lab[0])
+
+
+def _float32(values: NDArray) -> NDArray[np.float32]:
+    return values.astype(np.float32)
+
+
+def _together(parts: Mapping[str, NDArray[np.float32]], weights: Mapping[str, float]) -> NDArray[np.float32]:
     return np.sqrt(np.sum([(weights[name] * part) ** 2 for name, part in parts.items()], axis=0))

@@ -221,7 +221,8 @@ class _Smooth:
         left = np.maximum(own - 2 * slope * joint + slope**2 * spread[..., None], 0.0)
         kept = np.maximum(0.0, 1 - 1.2 * variance[..., None] / np.maximum(left, 1e-30))
         offset = across - slope * light[..., None]
-        lines = np.concatenate([slope, offset, kept, (4 / count)[..., None]], axis=-1)
+        # Offset and slope of windows of windows: each about half the variance of the mean of one.
+        lines = np.concatenate([slope, offset, kept, (1 / count)[..., None]], axis=-1)
         weights = (total[..., 0] > 0).astype(np.float64)
         smooth = _windowed(lines * weights[..., None]) / np.maximum(_windowed(weights), 1e-9)[..., None]
         self.lines, self.grid, self.noise = smooth, grid, noise
@@ -268,7 +269,8 @@ def _told_apart(
     """Maps that the model has, of gloss and bounce; and A."""
     terms = region.mixture.terms
     variance = variance + (region.body_noise * light) ** 2
-    gloss, bounce, _ = split(light, across, variance, axes, "bounce" in terms, "white" in terms, region.below)
+    has = "bounce" in terms, "white" in terms
+    gloss, bounce, _ = split(light, across, variance, axes, *has, region.below, region.shines)
     body = (light - gloss * axes.white[0] - bounce * axes.bounce[0]) / axes.length
     return [found for found, term in ((gloss, "white"), (bounce, "bounce")) if term in terms], body
 

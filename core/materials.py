@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .neighborhood import erode
-from .picture import Picture, as_weights
+from .picture import Picture, above
 from .reference import DARK, read_window, trimmed_mean
 
 # Points along the longer side of the grid that is looked at.
@@ -63,16 +63,19 @@ def find_materials(picture: Picture, white: NDArray, mask: NDArray | None = None
     height, width = picture.shape
     step = max(1, max(height, width) // _GRID)
     at = slice(step // 2, None, step)
-    pixels = picture.linear(at, at).astype(np.float64) / white
-    inside = np.ones(pixels.shape[:2], bool) if mask is None else as_weights(mask[at, at]) > 0.95
-    light = pixels.sum(axis=2)
-    inside &= (light > 3 * DARK) & np.isfinite(light) & (pixels * white < picture.clip_level).all(axis=2)
-    if not inside.any():
+    pixels = picture.linear(at, at)
+    inside = np.ones(pixels.shape[:2], bool) if mask is None else above(mask[at, at], 0.95)
+    colors = np.ascontiguousarray(pixels[inside].T)
+    balanced = colors / white.astype(np.float32)[:, None]
+    light = balanced.sum(axis=0)
+    usable = (light > 3 * DARK) & np.isfinite(light) & (colors < picture.clip_level).all(axis=0)
+    if not usable.any():
         return []
-    inside &= light > 0.1 * np.quantile(light[inside], 0.9)
-    hue, saturation = _hue(pixels, light)
-    kinds = _kinds(hue[inside], saturation[inside])
-    of = np.full(inside.shape, -1)
+    usable &= light > 0.1 * np.quantile(light[usable], 0.9)
+    inside[inside] = usable
+    hue, saturation = _hue(balanced.compress(usable, axis=1), light[usable])
+    kinds = _kinds(hue, saturation)
+    of = np.full(inside.shape, -1, kinds.dtype)
     of[inside] = kinds
     found = []
     for kind in range(kinds.max() + 1):
@@ -87,19 +90,18 @@ def find_materials(picture: Picture, white: NDArray, mask: NDArray | None = None
 
 
 def _hue(pixels: NDArray, light: NDArray) -> tuple[NDArray, NDArray]:
-    """Angle and length in the plane of chromaticities of white-balanced pixels."""
-    chroma = pixels / np.maximum(light, 1e-9)[..., None] - 1 / 3
-    x = (2 * chroma[..., 0] - chroma[..., 1] - chroma[..., 2]) / 6**0.5
-    y = (chroma[..., 1] - chroma[..., 2]) / 2**0.5
-    return np.arctan2(y, x), np.hypot(x, y)
+    """Angle and length in the plane of chromaticities of (3, n) white-balanced pixels."""
+    red, green, blue = pixels
+    x, y = (2 * red - green - blue) / 6**0.5, (green - blue) / 2**0.5
+    return np.arctan2(y, x), np.hypot(x, y) / light
 
 
-def _kinds(hue: NDArray, saturation: NDArray) -> NDArray[np.intp]:
+def _kinds(hue: NDArray, saturation: NDArray) -> NDArray[np.int8]:
     """(n,) number of the peak of hues that each pixel belongs to; one more for gray; -1 for none."""
     colored = saturation > _GRAY
     votes, _ = np.histogram(hue[colored], _BINS, (-np.pi, np.pi))
     votes = votes + np.roll(votes, 1) + np.roll(votes, -1)
-    kinds = np.full(len(hue), -1)
+    kinds = np.full(len(hue), -1, np.int8)
     count, taken = 0, np.zeros(_BINS, bool)
     centers = (np.arange(_BINS) + 0.5) * 2 * np.pi / _BINS - np.pi
     while True:
@@ -121,14 +123,17 @@ def _kinds(hue: NDArray, saturation: NDArray) -> NDArray[np.intp]:
 
 
 def _between(a: NDArray, b: float) -> NDArray:
-    return np.abs((a - b + np.pi) % (2 * np.pi) - np.pi)
+    apart = np.abs(a - b)
+    return np.minimum(apart, 2 * np.pi - apart)
 
 
 def _center(inside: NDArray[np.bool_]) -> tuple[int, int]:
     """(row, column) of a point farthest from the outline, roughly."""
     left = np.pad(inside, 1)
-    while (smaller := erode(left, 1)).any():
-        left = smaller
+    for k in reversed(range((min(left.shape) // 2).bit_length())):
+        smaller = erode(left, 1 << k)
+        if smaller.any():
+            left = smaller
     rows, columns = np.nonzero(left)
     k = len(rows) // 2
     return int(rows[k]) - 1, int(columns[k]) - 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,30 +13,58 @@ from .picture import Picture
 # Points in a window along each axis; a larger window is looked at on a coarser grid.
 _POINTS = 13
 
+# Positions that are looked around in one go, so that what is seen there fits the cache.
+_AT_ONCE = 4096
+
 
 def dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
     """Grow a (h, w) mask by a square of 2 radius + 1 pixels."""
-    out = mask
-    for axis in (0, 1):
-        reached = 0
-        while reached < radius:
-            # No further than what is reached already: past the border there is nothing to shift in.
-            step = min(radius - reached, reached + 1)
-            grown = out.copy()
-            ahead, behind = [slice(None)] * 2, [slice(None)] * 2
-            ahead[axis], behind[axis] = slice(step, None), slice(None, -step)
-            if step < out.shape[axis]:
-                grown[tuple(ahead)] |= out[tuple(behind)]
-                grown[tuple(behind)] |= out[tuple(ahead)]
-            else:
-                grown |= out.any(axis=axis, keepdims=True)
-            out, reached = grown, reached + step
-    return out
+    return _unpacked(_grown(mask, radius), mask.shape[1])
 
 
 def erode(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
     """Shrink a (h, w) mask by a square of 2 radius + 1 pixels; beyond the border counts as inside."""
     return ~dilate(~mask, radius)
+
+
+def along_outline(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
+    """Pixels of a (h, w) mask that :func:`erode` takes away, and those that :func:`dilate` adds."""
+    return _unpacked(_grown(mask, radius) & _grown(~mask, radius), mask.shape[1])
+
+
+def _grown(mask: NDArray[np.bool_], radius: int) -> NDArray[np.uint64]:
+    """Grow a (h, w) mask; returns it as bits, 64 pixels of a row in a word."""
+    words = np.zeros((mask.shape[0], -(-mask.shape[1] // 64)), "<u8")
+    packed = np.packbits(mask, axis=1, bitorder="little")
+    words.view(np.uint8)[:, : packed.shape[1]] = packed
+    for spread in (_spread_down, _spread_across):
+        reached = 0
+        while reached < radius:
+            # No further than what is reached already: past the border there is nothing to shift in.
+            step = min(radius - reached, reached + 1, 63)
+            words, reached = spread(words, step), reached + step
+    return words
+
+
+def _unpacked(words: NDArray[np.uint64], width: int) -> NDArray[np.bool_]:
+    return np.unpackbits(words.view(np.uint8), axis=1, count=width, bitorder="little").view(bool)
+
+
+def _spread_down(words: NDArray[np.uint64], step: int) -> NDArray[np.uint64]:
+    """Bits, and those `step` rows above and below them."""
+    out = words.copy()
+    out[step:] |= words[:-step]
+    out[:-step] |= words[step:]
+    return out
+
+
+def _spread_across(words: NDArray[np.uint64], step: int) -> NDArray[np.uint64]:
+    """Bits, and those `step` columns before and after them."""
+    ahead, rest = np.uint64(step), np.uint64(64 - step)
+    out = words | words << ahead | words >> ahead
+    out[:, 1:] |= words[:, :-1] >> rest
+    out[:, :-1] |= words[:, 1:] << rest
+    return out
 
 
 def window(radius: int) -> NDArray[np.intp]:
@@ -44,6 +74,7 @@ def window(radius: int) -> NDArray[np.intp]:
     return np.stack(np.meshgrid(offsets, offsets, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
+@cache
 def rings(*radii: tuple[float, ...]) -> list[NDArray[np.intp]]:
     """Offsets (n, 2), rows and columns, of points on circles: one array for each group of radii."""
     groups = []
@@ -74,17 +105,17 @@ def mean_at(
     Returns
     -------
     mean
-        (n, 3) float32 linear RGB, 0 where there is none.
+        (3, n) float32 linear RGB, 0 where there is none.
     found
         (n,) whether any wanted pixel was there.
     """
-    mean, found = np.zeros((len(rows), 3), np.float32), np.zeros(len(rows), bool)
+    mean, found = np.zeros((3, len(rows)), np.float32), np.zeros(len(rows), bool)
     for group in offsets:
         missing = np.flatnonzero(~found)
         if len(missing) == 0:
             break
         sums, total = _sums(picture, wanted, rows[missing], columns[missing], group)
-        mean[missing] = sums / np.maximum(total, 1)[:, None]
+        mean[:, missing] = sums / np.maximum(total, 1)
         found[missing] = total > 0
     return mean, found
 
@@ -92,24 +123,25 @@ def mean_at(
 def _sums(
     picture: Picture, wanted: NDArray[np.bool_], rows: NDArray, columns: NDArray, group: NDArray[np.intp]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(n, 3) sums of the wanted pixels at the offsets of one group, and (n,) how many they are."""
+    """(3, n) sums of the wanted pixels at the offsets of one group, and (n,) how many they are."""
     height, width = picture.shape
     codes, counts = picture.pixels.reshape(height * width, -1), wanted.reshape(-1)
-    sums, total = np.zeros((len(rows), 3), np.float32), np.zeros(len(rows), np.float32)
-    reach = np.abs(group).max(axis=0)
-    near_border = (
-        min(rows.min(), height - 1 - rows.max()) < reach[0] or min(columns.min(), width - 1 - columns.max()) < reach[1]
-    )
-    at = rows * width + columns
-    for down, across in group.tolist():
-        places = at + (down * width + across)
-        if near_border:
-            y, x = rows + down, columns + across
-            inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
-            counted = counts.take(places, mode="clip") & inside
-        else:
-            counted = counts.take(places)
-        light = transfer.decode(codes.take(places, axis=0, mode="clip")[:, :3], picture.curve)
-        np.add(sums, light, out=sums, where=counted[:, None])
-        total += counted
+    sums, total = np.zeros((3, len(rows)), np.float32), np.zeros(len(rows), np.float32)
+    down, across = group.T[..., None]
+    for start in range(0, len(rows), _AT_ONCE):
+        part = slice(start, start + _AT_ONCE)
+        y, x = rows[part], columns[part]
+        places = (down * width + across) + (y * width + x)
+        counted = counts.take(places, mode="clip")
+        if any(
+            at.min() + off.min() < 0 or at.max() + off.max() >= side
+            for at, off, side in ((y, down, height), (x, across, width))
+        ):
+            counted &= (y + down >= 0) & (y + down < height) & (x + across >= 0) & (x + across < width)
+        found = np.flatnonzero(counted)
+        of = found % len(y)
+        light = transfer.decode(codes.take(places.reshape(-1).take(found), axis=0)[:, :3], picture.curve)
+        total[part] = np.bincount(of, minlength=len(y))
+        for k in range(3):
+            sums[k, part] = np.bincount(of, light[:, k], len(y))
     return sums, total

@@ -204,12 +204,10 @@ def bounding_box(mask: NDArray) -> tuple[slice, slice]:
 def block_means(values: NDArray, step: int) -> NDArray[np.float32]:
     """(h, w, n) means of the step x step blocks of a (height, width, n) map; incomplete ones are left out."""
     rows, columns, count = values.shape[0] // step, values.shape[1] // step, values.shape[2]
-    whole = values[: rows * step].astype(np.float32, copy=False).reshape(rows, step, -1)
-    by_row = whole.sum(axis=1)[:, : columns * step * count].reshape(-1, step * count)
+    by_row = values[: rows * step].reshape(rows, step, -1).sum(axis=1, dtype=np.float32)
     # As a product, for sums of a few numbers that lie apart are slow.
-    return (by_row @ np.tile(np.eye(count, dtype=np.float32), (step, 1)) / np.float32(step * step)).reshape(
-        rows, columns, count
-    )
+    mean = np.tile(np.eye(count, dtype=np.float32) / np.float32(step * step), (step, 1))
+    return by_row[:, : columns * step * count].reshape(rows, columns, step * count) @ mean
 
 
 def _size(shape: tuple[int, ...]) -> str:

@@ -474,7 +474,7 @@ class _Reader:
         owner = f"{self.section} {self.index + 1}, " if self.section in ("region", "colorway") else ""
         if not key:
             owner, key = "", self.section
-        self.problems.append(f"{place}: {owner}{key}{joined}{said}.")
+        self.problems.append(f"{place}: {owner}{key}{joined}{said}" + "." * (not said.endswith("?")))
 
     def _line(self, key: str) -> int:
         """Line of a key of the present section, or of the section if it has none; 0 if that cannot be told."""

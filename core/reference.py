@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .dichromatic import sine
 from .errors import ReferenceColorError, WhiteError
-from .picture import Picture, as_weights
+from .neighborhood import mean_at, window
+from .picture import Picture, as_weights, strongest
 
 # Linear luminance under which a pixel is too dark, relative to white, to tell its color from noise.
 DARK = 0.004
@@ -25,19 +26,23 @@ SURE_WHITE = 0.75
 _CHANCES = (0.0, 0.65, 0.75, 1.0), (0.35, 0.45, 0.8, 0.95)
 
 # Pixels that a search looks at; more do not change the answer. The white is found from few of them.
-_SAMPLE, _SAMPLE_WHITE = 20_000, 60_000
+_READINGS, _SAMPLE_WHITE = 6_000, 60_000
+
+# The matte readings of a material are the lowest share of them that lie closer together than so many times the closest;
+# and how far these reach below the middle by noise alone, in standard deviations.
+_CLOSE, _AS_CLOSE, _CLOSE_DEVIATE = 0.15, 1.75, 1.33
 
 # Sine of the angle by which a pixel of the same material may leave the plane of its color and the white.
 _OFF_PLANE = 0.035
-
 
 # Distance from the median, in that of the nearer half of the pixels, up to which a pixel counts in full; at twice it,
 # not at all.
 _SCATTER = 0.8
 
 # Gloss in a clicked pixel, against its brightest channel and times the sine of its angle to the white: below the
-# first it is within what matte pixels scatter and is left alone, from the second on all of it is taken out.
-_GLOSS_RAMP = (0.011, 0.016)
+# first it is within what matte pixels scatter and is left alone, from the second on all of it is taken out;
+# both are more where the window is noisy.
+_GLOSS_RAMP = (0.005, 0.008)
 
 
 @dataclass(frozen=True)
@@ -164,28 +169,37 @@ def matte_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray |
     :func:`reference_at`, which reads a pixel as it is.
     """
     read = reference_at(picture, pixel, white, mask)
-    gloss = gloss_in(read, picture, white, mask)
-    low, high = np.array(_GLOSS_RAMP) * (read.color / white).max() / max(sine(read.color, white), 1e-3)
+    color = read.color / white
+    gloss = _gloss_against(color, _readings(picture, mask, read.pixel if mask is None else None) / white)
+    if gloss <= 0:
+        return read
+    around = read_window(picture, check_pixel(picture, pixel, "Reference pixel"), mask) / white
+    noise = _as_gloss(color, float((around @ _plane(color)[0]).std()) / len(around) ** 0.5)
+    low, high = np.maximum(np.array(_GLOSS_RAMP) * color.max() / max(sine(color), 1e-3), (2 * noise, 3 * noise))
     gloss *= float(np.clip((gloss - low) / (high - low), 0, 1))
     return Reference(read.color - gloss * white, read.pixel, gloss)
 
 
-def gloss_in(read: Reference, picture: Picture, white: NDArray, mask: NDArray | None = None) -> float:
-    """Surface reflection in a color that was read at a pixel, as a share of the white; >= 0.
+def _readings(picture: Picture, mask: NDArray | None, near: tuple[int, int] | None = None) -> NDArray[np.float64]:
+    """(n, 3) unclipped colors all over the product, or near a pixel, each read over a window as a click is.
 
-    It is compared with the pixels of the mask, or with those around the pixel.
+    So the grain of a texture and noise are as small in them as in a reference.
     """
-    if read.pixel is None:
-        return 0.0
-    if mask is None:
-        x, y = read.pixel
-        reach = max(8, round(0.12 * max(picture.shape)))
-        step = max(1, reach // 60)
-        rows, columns = slice(max(0, y - reach), y + reach, step), slice(max(0, x - reach), x + reach, step)
-        pixels = picture.linear(rows, columns).reshape(-1, 3)
+    height, width = picture.shape
+    wanted = np.ones((height, width), bool) if mask is None else strongest(mask)
+    if near is None:
+        step = max(1, int(np.sqrt(np.count_nonzero(wanted) / _READINGS)))
+        left = top = step // 2
+        right, bottom = width, height
     else:
-        pixels = picture.sample(_SAMPLE, mask)
-    return max(0.0, _gloss_against(read.color / white, pixels[pixels.max(axis=1) < picture.clip_level] / white))
+        reach = max(8, round(0.12 * max(height, width)))
+        step = max(1, reach // 60)
+        (left, right), (top, bottom) = ((max(0, k - reach), k + reach) for k in near)
+    rows, columns = np.nonzero(wanted[top:bottom:step, left:right:step])
+    rows, columns = top + step * rows, left + step * columns
+    clear = picture.at(rows, columns).max(axis=1) < picture.clip_level
+    means, _ = mean_at(picture, wanted, rows[clear], columns[clear], [window(window_radius(picture.shape))])
+    return means.T[np.isfinite(means).all(axis=0)].astype(np.float64)
 
 
 def _gloss_against(color: NDArray, pixels: NDArray) -> float:
@@ -200,22 +214,34 @@ def _gloss_against(color: NDArray, pixels: NDArray) -> float:
     a, b = split @ pixels.T
     normal, _ = _plane(color)
     off = pixels @ normal
-    same = (a > 0) & (np.abs(off) < _OFF_PLANE * np.linalg.norm(pixels, axis=1))
+    angle = np.where(a > 0, np.abs(off) / np.linalg.norm(pixels, axis=1).clip(1e-12), np.inf)
+    near, same = _OFF_PLANE, angle < _OFF_PLANE
+    # Noise that fills the gate is more than is seen of it.
+    while near < 1 and same.any() and np.median(angle[same]) > near / 3:
+        near *= 2
+        same = angle < near
     if np.count_nonzero(same) < 20:
         return 0.0
     # Only the best lit: reflections of all that is around, light that met the cloth twice, and noise weigh less there.
     lit = same & (a > 0.8 * np.quantile(a[same], 0.9))
-    low, middle, high = np.quantile(b[lit] / a[lit], (0.1, 0.5, 0.9))
-    # Gloss reaches upward. What reaches as far down is noise, and farther down the light of folds: no edge to go to.
-    both = (middle - low) / max(high - middle, 1e-9)
-    # Noise widens the spread: by as much as it does off the plane, if its variance goes with the light of a channel.
-    shot = np.maximum(color, 0)
-    noise = np.median(np.abs(off[lit] / a[lit])) / 0.6745 * np.sqrt((split[1] ** 2 @ shot) / (normal**2 @ shot))
-    edge = middle - np.sqrt(max(0.0, (middle - low) ** 2 - (1.28 * noise) ** 2))
-    matte = color + edge + (middle - edge) * np.clip((both - 0.9) / 0.15, 0, 1)
+    away = off[lit] / a[lit]
+    noise = _as_gloss(color, float(np.median(np.abs(away - np.median(away)))) / 0.6745)
+    # Gloss reaches far upward and light of folds far downward. Matte readings lie close together, below those of gloss.
+    ratio = np.sort(b[lit] / a[lit])
+    count = int(_CLOSE * len(ratio))
+    width = ratio[count:] - ratio[: len(ratio) - count]
+    edge = ratio[np.argmax(width <= _AS_CLOSE * width.min())]
+    above = max(0.0, float(np.median(ratio)) - edge)
+    matte = color + edge + above - np.sqrt(max(0.0, above**2 - (_CLOSE_DEVIATE * noise) ** 2))
     # A matte color that is almost grey, or none, says nothing of the material.
     known = matte.max() > 0 and sine(np.maximum(matte, 0)) > 0.05
     return float(color[0] - matte[0]) if known else 0.0
+
+
+def _as_gloss(color: NDArray, off: float) -> float:
+    """Noise of gloss from that off the plane of a white-balanced color: variance goes with the light of a channel."""
+    body, gloss = np.maximum(color, 0), np.linalg.pinv(np.column_stack([color, np.ones(3)]))[1]
+    return off * float(np.sqrt((gloss**2 @ body) / (_plane(color)[0] ** 2 @ body)))
 
 
 def _plane(color: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -235,7 +261,7 @@ def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = Non
     """Find the product's body color inside the mask: matte, unclipped, not dark, trimmed.
 
     Gloss makes a color paler and brighter, folds and shadow make it darker and more colored. So: of the well lit
-    pixels of the mask's main color the median, moved within its plane to the most matte of the best lit ones.
+    readings of the mask's main color the median, moved within its plane to where the best lit ones begin to lie close.
 
     Parameters
     ----------
@@ -251,9 +277,7 @@ def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = Non
     ReferenceColorError
         If every pixel is clipped or black.
     """
-    pixels = picture.sample(_SAMPLE, mask) if mask is not None else picture.sample(_SAMPLE)
-    pixels = pixels[np.isfinite(pixels).all(axis=1)].astype(np.float64)
-    usable = pixels[(pixels.max(axis=1) < picture.clip_level)]
+    usable = _readings(picture, mask)
     if len(usable) == 0:
         raise ReferenceColorError(
             "Every pixel of the product is clipped, so its color is lost: use a darker exposure, or give the "

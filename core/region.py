@@ -452,9 +452,10 @@ def _soft_edge(picture: Picture, small: NDArray, grown: NDArray[np.bool_], step:
     product, has_product = mean_at(reduced, grown & ~band, y, x, around)
     behind, has_behind = mean_at(reduced, ~grown & ~band, y, x, around)
     across = product - behind
-    length = np.einsum("ij,ij->i", across, across)
+    length = np.square(across).sum(axis=0)
     known = has_product & has_behind & (length > 1e-6)
-    across /= np.maximum(length, 1e-12)[:, None]
+    across /= np.maximum(length, 1e-12)
+    across, behind = across.T, behind.T
     cell = np.full(grown.shape, -1, np.int32)
     cell[y, x] = np.where(known, np.arange(len(y)), -1)
 

@@ -43,9 +43,13 @@ _FEWEST, _WINDOW = 100, 3
 # laboratory's pictures at qualities of 85 to 95).
 _BLOCK, _PER_FLAT = 8, 12.0
 
-# Variance in the window of a reference, against that of noise, that noise may be mistaken for; and pixels that a
-# reference is read from.
-_MISTAKEN, _READ = 1.2, 6
+# Times that a value turns up in a sample, on average, from which values are codes; and gaps on both sides of a level
+# that tell its step.
+_REPEATED, _AROUND = 4, 3
+
+# Variance in the window of a reference, against that of noise, that noise may be mistaken for; and that up to which
+# noise is not seen there. Pixels that a reference is read from.
+_MISTAKEN, _SHOWN, _READ = 1.2, 0.2, 6
 
 # Noise of a pixel, relative to its light, from which means of windows are looked at; and half the side of the widest
 # window, as a share of the picture.
@@ -66,8 +70,12 @@ _SHINY = 0.05
 # Share of clipped pixels from which there may be highlights among them.
 _FEWEST_CLIPPED = 0.002
 
-# Share of the variance that may lie between neighboring pixels where light of another color falls.
-_ROUGH = 0.1
+# Tilts of the plane of body and white that a wrong white makes: 0.25 for one that is 30 % wrong in a channel.
+_TILTS = np.linspace(-0.4, 0.4, 33)
+
+# Share of the variance that may lie between neighboring pixels where light of another color falls, and in bounce:
+# between them it is 0.02 to 0.2 in folds and 0.4 in heather.
+_ROUGH, _TEXTURED = 0.1, 0.3
 
 # Sine of the angle to the white under which a product is gray, and up to which it is taken for gray when the region is
 # too small to look at.
@@ -204,6 +212,7 @@ def choose(
         glossy = figures["glossy_unexplained"] < few and figures["bounce"] < _MOST_BOUNCE
         # What is bounced all over metal is the color of its surroundings.
         glossy &= not metallic or broken < _MOSTLY
+        glossy = bool(glossy) and _roughness(picture, seen, mask, noise, axis=0) < _TEXTURED
     found: Mixture | None
     other: Mixture | None = None
     away = float(np.linalg.norm(frame(steady / white, feedback).bounce[1:]))
@@ -211,7 +220,9 @@ def choose(
         found = mixture.matte_bounce(body, white, feedback)
     elif matte or glossy or model == "bounce":
         found = mixture.mapped("bounce", steady, white, feedback if matte else usual, gloss=not matte)
-    elif model == "lights" or (model == "auto" and broken > _LIT_OTHERWISE and _is_smooth(picture, seen, mask, noise)):
+    elif model == "lights" or (
+        model == "auto" and broken > _LIT_OTHERWISE and _roughness(picture, seen, mask, noise, axis=1) < _ROUGH
+    ):
         found, other = _lit(seen, body, white, figures, model)
     else:
         found = None
@@ -228,14 +239,23 @@ def _lit(
 ) -> tuple[Mixture | None, Mixture | None]:
     """A model for what gloss and bounce do not explain, None if it is not the light either; and one that may be right.
 
-    Two lights, if the product shines and they do explain it. Without highlights a gain by channel is right for any
-    light, and for metal; but a fold whose bounce is only half explained is a fold.
+    Two lights, if the product shines and they do explain it, and another white alone does not. Without highlights a
+    gain by channel is right for any light, and for metal. But where bounce explains half of it and no pixel is paler
+    than the body color, it is a fold.
     """
     light, figures["lights_unexplained"] = _lights(seen)
     lit = mixture.two_lights(body, white, light)
     if model == "lights":
         return lit, None
     other = lit if figures["lights_unexplained"] < _LIT_OTHERWISE else None
+    figures["paler"] = _paler(seen)
+    half = figures["glossy_unexplained"] < max(figures["residual"], figures["negative_gloss"]) / 2
+    fold = half and figures["paler"] < _FEW and figures["bounce"] < _MOST_BOUNCE
+    if fold and figures["split_noise"] < _NOISY:
+        return mixture.mapped("bounce", body, white, interreflection.USUAL), None
+    figures["off_plane"] = _off_plane(seen)
+    if figures["off_plane"] < _LIT_OTHERWISE:
+        return None, None
     if figures["highlights"] > _FEW:
         quiet = figures["split_noise"] < (_LOUD if figures["highlights"] > _SHINES else _NOISY)
         return (other, None) if figures["residual"] > _OTHER_LIGHT[0] and quiet else (None, other)
@@ -295,16 +315,29 @@ def noise_across(picture: Picture, body: NDArray, white: NDArray) -> Noise:
 def _rounding(picture: Picture, body: NDArray, white: NDArray, rows: slice) -> Noise:
     """What the steps of the codes do to the color across, and compression by the flatness that it leaves."""
     codes = picture.pixels[rows, :, :3]
+    light, coarseness = np.stack([np.zeros(3), np.clip(body, 0, 1)]), 1.0
     if codes.dtype.kind == "f":
-        return _QUIET
-    step = 1 / np.iinfo(codes.dtype).max
-    light = np.stack([np.zeros(3), np.clip(body, 0, 1)])
-    encoded = np.asarray(picture.curve.encode(light), np.float64)
-    around = [np.asarray(picture.curve.decode(encoded + k * step / 2), np.float64) for k in (-1, 1)]
+        steps = np.stack([_steps(picture.linear(rows)[..., k], light[:, k]) for k in range(3)], axis=1)
+    else:
+        half = 0.5 / np.iinfo(codes.dtype).max
+        encoded, coarseness = np.asarray(picture.curve.encode(light), np.float64), _coarseness(codes)
+        above, below = (np.asarray(picture.curve.decode(encoded + k * half), np.float64) for k in (1, -1))
+        steps = above - below
     # Uniform over a step, whose square grows about as the light.
-    read, full = (((around[1] - around[0]) / white) ** 2).mean(axis=1) / 12 * _coarseness(codes) ** 2
+    read, full = ((steps / white) ** 2).mean(axis=1) / 12 * coarseness**2
     shot = max(0.0, float(full - read)) / float(np.linalg.norm(body / white))
     return Noise(max(_QUIET.read, float(np.sqrt(read))), shot)
+
+
+def _steps(values: NDArray, light: NDArray) -> NDArray[np.float64]:
+    """Steps between the values of a channel (h, w) at some levels of light (n,); 0 if they are no codes."""
+    varied = values[:, 1:][values[:, 1:] != values[:, :-1]]
+    levels = np.unique(varied)
+    if len(levels) < 3 or _REPEATED * len(levels) > len(varied):
+        return np.zeros(len(light))
+    gaps = np.diff(levels)
+    at = np.clip(np.searchsorted(levels, light), _AROUND, max(_AROUND, len(gaps) - _AROUND))
+    return np.array([np.median(gaps[k - _AROUND : k + _AROUND]) for k in at])
 
 
 def _coarseness(codes: NDArray) -> float:
@@ -358,7 +391,10 @@ def steadied(
     beyond = max(0.0, float(np.median((color - mean) ** 2 / sigma[:, None] ** 2)) / 0.4549 - _MISTAKEN)
     share = 1 / (1 + _READ * beyond)
     steady = axes.along + share * mean @ axes.across
+    # Noise that does not show in a window, as that of coarse codes, is common to all of it.
+    common = max(0.0, 1 - float(np.mean((color - mean)[close] ** 2 / sigma[close, None] ** 2)) / _SHOWN)
     left = single * float(np.hypot((1 - share) / _READ**0.5, share / np.count_nonzero(close) ** 0.5))
+    left = float(np.hypot(left, single * common**0.5))
     return steady * axes.length / np.linalg.norm(steady) * white, left
 
 
@@ -467,6 +503,13 @@ def _glossy(seen: _Seen, feedback: float) -> dict[str, float]:
     }
 
 
+def _paler(seen: _Seen) -> float:
+    """Share that leaves the body color the other way than light that met it twice: gloss, mirrored things, a lamp."""
+    axes = frame(seen.body)
+    towards = np.array(axes.bounce[1:]) / max(float(np.linalg.norm(axes.bounce[1:])), 1e-9)
+    return float((seen.pixels @ axes.across.T @ towards < -2 * _GLOSS_SEEN - 3 * seen.noise).mean())
+
+
 def _lights(seen: _Seen) -> tuple[NDArray[np.float64], float]:
     """Color of the second light that leaves the least gloss, and the share of pixels that stay impossible."""
     length = float(np.linalg.norm(seen.body))
@@ -484,19 +527,28 @@ def _lights(seen: _Seen) -> tuple[NDArray[np.float64], float]:
     return best, share
 
 
-def _is_smooth(picture: Picture, seen: _Seen, mask: NDArray | None, noise: Noise) -> bool:
-    """Whether what leaves the plane of body and white changes slowly over the region, as light does and texture not."""
+def _off_plane(seen: _Seen) -> float:
+    """Share of pixels that the plane of the body color and the best of other whites does not explain."""
+    y1, y2 = (seen.pixels @ frame(seen.body).across.T).T
+    return min(float((np.abs(y2 - t * y1) > 3 * np.hypot(1, t) * seen.noise).mean()) for t in _TILTS)
+
+
+def _roughness(picture: Picture, seen: _Seen, mask: NDArray | None, noise: Noise, axis: int) -> float:
+    """Share of the variance of a color across that lies between neighbors: small for light, not for texture.
+
+    Axis 0 lies in the plane of body and white, axis 1 leaves it.
+    """
     height, width = picture.shape
     rows = slice(None, None, max(1, height * width // _ROWS))
     axes = frame(seen.body)
     balanced = picture.linear(rows) / seen.white
     light = np.maximum(balanced @ axes.along, _DARK * axes.length)
-    off = (balanced @ axes.across[1]) / light
+    off = (balanced @ axes.across[axis]) / light
     inside = np.ones(off.shape, bool) if mask is None else as_weights(mask[rows]) > 0.95
     both = inside[:, 1:] & inside[:, :-1]
     if np.count_nonzero(both) < _FEWEST:
-        return False
+        return np.inf
     grain = (noise.at(light) / light)[inside].mean() ** 2
     step = (np.median(np.abs(off[:, 1:] - off[:, :-1])[both]) / 0.6745) ** 2 / 2
     whole = float(off[inside].var())
-    return step - grain < _ROUGH * (whole - grain)
+    return max(0.0, step - grain) / max(whole - grain, 1e-12)

@@ -10,6 +10,9 @@ done about it, in this order:
 2. B and C are the most probable ones: Gaussian noise, and a prior that allows any gloss above zero, hardly any
    below, and a bounce of the size that folds have. Each weighs by the noise of the pixel, so that what is poorly
    determined shrinks to none, and nothing changes where the noise is small.
+3. Gloss and bounce move the color in almost opposite directions on a pale product, so that noise makes both where
+   there is neither. Each is held against its own size (the nonnegative garrote, Breiman 1995), and what then makes up
+   for the other is none.
 
 The light along the body color is never touched: shading and texture stay as they are.
 
@@ -19,6 +22,7 @@ K. He, J. Sun and X. Tang, "Guided image filtering", IEEE Trans. Pattern Anal. M
 K. He and J. Sun, "Fast guided filter", arXiv:1505.00996 (2015).
 J.-S. Lee, "Digital image enhancement and noise filtering by use of local statistics", IEEE Trans. Pattern Anal. Mach.
 Intell. 2, 165-168 (1980).
+L. Breiman, "Better subset regression using the nonnegative garrote", Technometrics 37, 373-384 (1995).
 """
 
 from __future__ import annotations
@@ -37,6 +41,9 @@ MODEL_ERROR = 0.003
 # the body's light.
 _GLOSS, NO_GLOSS = 1.0, 0.02
 USUAL_BOUNCE, _NO_BOUNCE = 0.3, 0.05
+
+# Variances of the noise that the square of gloss or bounce is held against where the pixel shows both.
+_DOUBT = 2.5
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,7 @@ def split(
     bounce: bool,
     gloss: bool = True,
     below: float = NO_GLOSS,
+    doubted: bool = False,
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Most probable gloss and bounce of pixels.
 
@@ -105,6 +113,8 @@ def split(
         Whether there is any of each.
     below
         Width of the prior of gloss below zero, as a share of the light.
+    doubted
+        Whether gloss and bounce in one pixel may be noise that makes up for each other.
 
     Returns
     -------
@@ -136,7 +146,46 @@ def split(
         c = r2 / (f1 * f1 + f2 * f2 + folded * np.where(r2 >= 0, USUAL_BOUNCE**-2, _NO_BOUNCE**-2).astype(light.dtype))
     left = ((y1 - e1 * b - f1 * c) ** 2 + (y2 - e2 * b - f2 * c) ** 2) / total
     if gloss:  # what single pixels do not prove is none
-        doubt = 4 * variance / np.maximum(axes.white[1] ** 2 * b * b, 1e-30)
-        b *= np.maximum(0.0, 1 - doubt)
+        if doubted and bounce:
+            normal = e1 * e1 + e2 * e2, f1 * f1 + f2 * f2
+            b, c = _garrote((b, c), (r1, r2), _DOUBT * variance, normal, e1 * f1 + e2 * f2)
+        else:
+            b *= np.maximum(0.0, 1 - 4 * variance / np.maximum(axes.white[1] ** 2 * b * b, 1e-30))
         np.minimum(b, light / axes.white[0], out=b)  # no more gloss than light
     return b, c, left
+
+
+def _garrote(
+    found: tuple[NDArray, NDArray],
+    products: tuple[NDArray, NDArray],
+    doubt: NDArray,
+    squares: tuple[float, float],
+    product: float,
+) -> tuple[NDArray, NDArray]:
+    """Gloss and bounce with a price on each that falls with its size, and no less than zero of what was above it.
+
+    Parameters
+    ----------
+    found
+        Gloss and bounce without a price.
+    products
+        Of the color across with the directions of both.
+    doubt
+        Price, times what it is put on.
+    squares, product
+        Of the directions: the normal equations of the split.
+    """
+    prices = [doubt / np.maximum(k, 1e-9) for k in found]
+    p1, p2 = (p - price for p, price in zip(products, prices, strict=True))
+    scale = 1 / max(squares[0] * squares[1] - product**2, 1e-12)
+    both = (squares[1] * p1 - product * p2) * scale, (squares[0] * p2 - product * p1) * scale
+    alone = np.maximum(p1 / squares[0], 0), np.maximum(p2 / squares[1], 0)
+    needed = (both[0] > 0) & (both[1] > 0)
+    no_gloss = p1 <= product * alone[1]
+    priced = np.where(needed, both[0], ~no_gloss * alone[0]), np.where(needed, both[1], no_gloss * alone[1])
+    seen = (found[0] > 0) & (found[1] > 0)
+    single = (
+        np.where(k > 0, np.maximum(k - price / a, 0), k) for k, price, a in zip(found, prices, squares, strict=True)
+    )
+    b, c = (np.where(seen, p, k) for p, k in zip(priced, single, strict=True))
+    return b, c

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from . import colorimetry, recolor
 from .colorspace import SRGB
-from .picture import Picture, as_weights, block_means
+from .picture import Picture, block_means, bounding_box
 from .recipe import Prepared
 from .region import shrink
 
@@ -20,12 +20,18 @@ class Proxy:
 
     Attributes
     ----------
+    codes
+        (height, width, 3) sRGB codes of the small photo.
+    box
+        (rows, columns) of the part that the regions lie in.
     picture
-        The small photo, linear.
+        This part, linear, in the photo's space.
     masks, extras
-        Of each region, of the size of the small photo, or None.
+        Of each region, of the size of this part, or None.
     """
 
+    codes: NDArray[np.uint8]
+    box: tuple[slice, slice]
     picture: Picture
     masks: tuple[NDArray | None, ...]
     extras: tuple[NDArray | None, ...]
@@ -36,20 +42,37 @@ def proxy_of(prepared: Prepared, longest: int = 128) -> Proxy:
     picture = prepared.analyses[0].picture
     step = max(1, round(max(picture.shape) / longest))
     step = min(step, *picture.shape)
-    regions = prepared.regions()
+    small = Picture(shrink(picture, step))
+    masks = [None if a.mask is None else _small_mask(a.mask, step) for a in prepared.analyses]
+    extras = [None if a.extra is None else block_means(a.extra, step) for a in prepared.analyses]
+    covered = np.maximum.reduce([np.ones(small.shape) if mask is None else mask for mask in masks])
+    box = bounding_box(covered if covered.any() else np.ones(small.shape))
     return Proxy(
-        Picture(shrink(picture, step)),
-        tuple(None if r.mask is None else block_means(as_weights(r.mask)[..., None], step)[..., 0] for r in regions),
-        tuple(None if r.extra is None else block_means(r.extra, step) for r in regions),
+        _codes(small, [], prepared),
+        box,
+        Picture(small.pixels[box]),
+        tuple(None if mask is None else mask[box] for mask in masks),
+        tuple(None if extra is None else extra[box] for extra in extras),
     )
 
 
 def thumbnail(proxy: Proxy, prepared: Prepared) -> NDArray[np.uint8]:
     """(height, width, 3) sRGB codes of the small photo in the targets of `prepared`, which it was made of."""
     regions = [
-        replace(region, mask=mask, edge=None, extra=extra)
+        replace(region, mask=mask, edge=None, extra=None if region.extra is None else extra)
         for region, mask, extra in zip(prepared.regions(), proxy.masks, proxy.extras, strict=True)
     ]
+    made = proxy.codes.copy()
+    made[proxy.box] = _codes(proxy.picture, regions, prepared)
+    return made
+
+
+def _small_mask(mask: NDArray, step: int) -> NDArray[np.float32]:
+    means = block_means(mask[..., None], step)[..., 0]
+    return means / np.float32(np.iinfo(mask.dtype).max) if mask.dtype.kind == "u" else means
+
+
+def _codes(picture: Picture, regions: list[recolor.RegionMatrix], prepared: Prepared) -> NDArray[np.uint8]:
     convert = colorimetry.conversion_matrix(prepared.space, SRGB) if prepared.space is not SRGB else None
-    codes, _ = recolor.recolor(proxy.picture, regions, curve=SRGB.curve, dtype=np.uint8, threads=1, convert=convert)
+    codes, _ = recolor.recolor(picture, regions, curve=SRGB.curve, dtype=np.uint8, threads=1, convert=convert)
     return codes

@@ -179,7 +179,7 @@ def test_check_writes_nothing_and_finds_everything(run, shop, tmp_path):
     (shop.parent / "loop.png").symlink_to(shop.parent / "loop.png")
     Image.new("L", (10, 10), 255).save(shop.parent / "small.png")
     shop.write_text(
-        "photo,click,mask,target\n"
+        "photo,click,mask,target,output,compression\n"
         'photos/ball0.png,"99,1",,#fff\n'
         "photos/ball1.png,,small.png,#fff\n"
         "photos/ball2.png,,no.png,#fff\n"
@@ -187,23 +187,32 @@ def test_check_writes_nothing_and_finds_everything(run, shop, tmp_path):
         "photos/empty.png,,,#fff\n"
         "loop.png,,,#fff\n"
         "photos,,,#fff\n"
+        "photos/ball0.png,,alpha,#000\n"
+        "photos/ball0.png,,,#000,a.tif,zipp\n"
     )
     code, _, err = run(shop, "--out", tmp_path / "out", "--check")
     assert code == 2
     for row, words in (
-        (2, r"click \(99, 1\) lies outside the photo of 64 x 64 pixels"),
-        (3, r"small.png' is 10 x 10 pixels and photo .* 64 x 64: make it the size"),
-        (4, r"no.png' cannot be read \(No such file"),
-        (5, r"broken.png' is no picture, or is damaged"),
+        (2, r"column 'click': click \(99, 1\) lies outside the photo of 64 x 64 pixels"),
+        (3, r"column 'mask': .*small.png' is 10 x 10 pixels and photo .* 64 x 64: make it the size"),
+        (4, r"column 'mask': .*no.png' cannot be read \(No such file"),
+        (5, r"column 'photo': .*broken.png' is no picture, or is damaged"),
         (6, r"empty.png' is empty"),
         (7, r"loop.png' cannot be read \(Too many levels of symbolic links\)"),
         (8, r"photos' cannot be read \(Is a directory\)"),
+        (9, r"column 'mask': .*ball0.png' has no alpha to take the mask from"),
+        (10, r"column 'compression': The compression 'zipp' is not known for tiff: use none, lzw"),
     ):
-        assert re.search(f"row {row}: .*{words}", err), (row, err)
-    assert "7 problems, nothing written" in err
+        assert re.search(f"row {row}, .*{words}", err), (row, err)
+    assert "9 problems, nothing written" in err
+    rows = [int(found) for found in re.findall(r"row (\d+)", err)]
+    assert rows == sorted(rows)
     assert not (tmp_path / "out").exists()
     said = run(shop, "--out", tmp_path / "out", "--check", "--json")[1]
-    assert len([json.loads(line)["error"] for line in said.splitlines()]) == 7
+    first, *others = [json.loads(line) for line in said.splitlines()]
+    assert (first["file"], first["row"], first["column"]) == (str(shop), 2, "click")
+    assert first["error"].startswith("click (99, 1) lies outside")
+    assert len(others) == 8
 
 
 def test_a_turned_photo_is_checked_upright(run, tmp_path, product):
@@ -267,6 +276,48 @@ def test_outputs_are_never_overwritten_unasked(run, shop, tmp_path):
     assert "holds an earlier run: give --resume" in run(shop, "--out", out)[2]
 
 
+def test_a_page_of_someone_else_s_is_not_overwritten(run, shop, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "index.html").write_text("mine")
+    code, _, err = run(shop, "--out", out)
+    assert code == 2
+    assert "index.html' exists already: give --resume" in err
+    assert run(shop, "--out", out, "--no-sheets")[0] == 0
+    assert (out / "index.html").read_text() == "mine"
+    assert run(shop, "--out", out, "--force")[0] == 0
+    assert "mine" not in (out / "index.html").read_text()
+
+
+@pytest.mark.parametrize("content", ["photo,target\na.png,#fff\n", '{"photo": "a.png", "output": "b.png"}\n', "no end"])
+def test_what_is_no_journal_is_left_alone(run, shop, tmp_path, content):
+    table = tmp_path / "table.csv"
+    table.write_text(content)
+    code, _, err = run(shop, "--out", tmp_path / "out", "--journal", table, "--force")
+    assert code == 2
+    assert "table.csv' is no journal of Dyehouse" in err
+    assert table.read_text() == content
+
+
+def test_only_unfinished_files_of_a_run_are_removed(run, tmp_path, product):
+    scene = product(size=64)
+    mine = photo(tmp_path / ".dyehouse-photo.png", scene)
+    (tmp_path / ".dyehouse-0123456789ab.png").write_bytes(b"half")
+    x, y = scene.matte
+    (tmp_path / "t.csv").write_text(f'photo,click,target,output\n{mine.name},"{x},{y}",#1F4E79,a.png\n')
+    assert run(tmp_path / "t.csv", "--out", tmp_path)[0] == 0
+    assert {path.name for path in tmp_path.glob(".dyehouse-*")} == {mine.name}
+
+
+@pytest.mark.parametrize("pattern", ["./ball1.png", ".//ball1.png", "x/../ball1.png", r".\ball1.png"])
+def test_no_other_spelling_of_a_name_reaches_an_input(run, tmp_path, product, pattern):
+    table = catalog(tmp_path / "shop", product, 2)
+    before = files_of(tmp_path / "shop" / "photos")
+    table.write_text(f"photo,mask,target,output\nphotos/ball0.png,photos/ball1.png,#1F4E79,{pattern}\n")
+    assert run(table, "--out", tmp_path / "shop" / "photos", "--force")[0] == 2
+    assert files_of(tmp_path / "shop" / "photos") == before
+
+
 @pytest.mark.parametrize("option", ["--force", "--resume"])
 def test_inputs_are_never_touched(run, tmp_path, product, option):
     table = catalog(tmp_path / "shop", product, 1)
@@ -275,6 +326,9 @@ def test_inputs_are_never_touched(run, tmp_path, product, option):
     code, _, err = run(table, "--out", tmp_path / "shop" / "photos", option)
     assert code == 2
     assert "is a file that the run reads" in err
+    os.link(tmp_path / "shop" / "photos" / "ball0.png", tmp_path / "other.png")  # one file of two names
+    table.write_text("photo,target,output\n../other.png,#1F4E79,ball0.png\n")
+    assert "is a file that the run reads" in run(table, "--out", tmp_path / "shop" / "photos", option)[2]
     link = tmp_path / "link"
     link.symlink_to(tmp_path / "shop" / "photos")
     assert run(table, "--out", link, option)[0] == 2
@@ -369,6 +423,10 @@ def test_the_gate_sets_aside_with_a_reason(run, shop, tmp_path):
     code, said, _ = run(shop, "--out", out, "--max-error", "50", "--allow-warnings", "--resume")
     assert "6 done" in said
     assert not [name for name in files_of(out) if name.startswith("needs")]
+    # So does making all anew, in either direction: a result is in one place.
+    for gate, place in (("0", "needs-a-person/ball0-navy.png"), ("50", "ball0-navy.png")):
+        assert run(shop, "--out", out, "--force", "--max-error", gate, "--allow-warnings")[0] == 0
+        assert [name for name in files_of(out) if name.endswith("ball0-navy.png")] == [place]
 
 
 def test_the_gate_reads_warnings(run, tmp_path, product):
@@ -536,6 +594,23 @@ def test_a_worker_killed_midway_is_replaced(tmp_path, product):
     assert files_of(tmp_path / "out") == files_of(whole)
 
 
+def noted(out):
+    """Results that the journal knows of, also if its last line is cut off."""
+    journal = out / "dyehouse-journal.jsonl"
+    lines = journal.read_bytes().split(b"\n")[:-1] if journal.exists() else ()
+    return {entry["output"] for entry in map(json.loads, lines) if entry["status"] == "done"}
+
+
+def check_what_a_kill_leaves(out):
+    """Every file is whole, the journal's are there, and no more are lost than those of the photos in flight."""
+    made = {path.name for path in out.glob("ball*")}
+    for name in made:
+        with Image.open(out / name) as picture:
+            picture.load()
+    assert noted(out) <= made
+    assert len(made - noted(out)) <= 2 * 2 * 2  # two workers, each with a photo and another ahead, of two colorways
+
+
 @pytest.mark.slow
 def test_killed_at_twenty_moments_and_resumed(tmp_path, product):
     table = catalog(tmp_path / "shop", product, 10, size=500)
@@ -545,21 +620,23 @@ def test_killed_at_twenty_moments_and_resumed(tmp_path, product):
     undisturbed.stdout.readline()
     first = time.perf_counter() - begun
     assert finish(undisturbed)[0] == 0
-    moments = np.random.default_rng(7).uniform(0.8 * first, time.perf_counter() - begun, 20)
+    moments = np.random.default_rng().uniform(0.8 * first, time.perf_counter() - begun, 20)
+    print("killed after", *moments, "s")  # shown if it fails
     killed = []
-    for moment in moments:
+    for k, moment in enumerate(moments):
         shutil.rmtree(out, ignore_errors=True)
-        process = started(table, out, "--workers", "2")
-        time.sleep(moment)
-        if process.poll() is None:
-            killed.append(len(list(out.glob("*.png"))) if out.exists() else 0)
-        kill(process)
-        for path in out.rglob("*.png") if out.exists() else ():
-            if not path.name.startswith(".dyehouse-"):
-                with Image.open(path) as picture:
-                    picture.load()  # what has its name is whole
-        code, _, err = finish(started(table, out, "--workers", "2", "--resume"))
+        # Every other time the run that goes on is killed as well.
+        for options in ((), ("--resume",))[: 1 + k % 2]:
+            process = started(table, out, "--workers", "2", *options)
+            time.sleep(moment)
+            if process.poll() is None:
+                killed.append(len(noted(out)))
+            kill(process)
+            check_what_a_kill_leaves(out)
+        before = noted(out)
+        code, lines, err = finish(started(table, out, "--workers", "2", "--resume"))
         assert code == 0, err
+        assert json.loads(lines[-1])["summary"]["kept"] == len(before)
         assert files_of(out) == files_of(whole)
     # Some were killed while they worked, or the test shows nothing.
     assert sum(0 < count < 20 for count in killed) >= 5
@@ -571,15 +648,37 @@ def test_killed_once_and_resumed(tmp_path, product):
     process = started(table, out, "--workers", "2")
     process.stdout.readline()
     kill(process)
-    finished = len([n for n in files_of(out) if n.startswith("ball")])
+    check_what_a_kill_leaves(out)
+    before = noted(out)
+    assert before
     code, lines, err = finish(started(table, out, "--resume"))
     assert code == 0, err
     summary = json.loads(lines[-1])["summary"]
-    assert summary["kept"] + summary["done"] == 10
-    assert summary["kept"] >= 1
-    assert summary["kept"] <= finished
+    assert (summary["kept"], summary["done"]) == (len(before), 10 - len(before))
     assert finish(started(table, tmp_path / "whole"))[0] == 0
-    assert files_of(out) == files_of(tmp_path / "whole")
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "whole")
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
+def test_memory_does_not_grow_with_the_photos(tmp_path, product):
+    table = catalog(tmp_path / "shop", product, 18, size=640)
+    process = started(table, tmp_path / "out", "--workers", "2")
+
+    def peak():
+        """Greatest memory so far of the run and its workers, in bytes."""
+        found = 0
+        for pid in (process.pid, *descendants(process.pid)):
+            with contextlib.suppress(OSError):  # it has just ended
+                kilobytes = re.findall(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text())
+                found += 1024 * sum(map(int, kilobytes))
+        return found
+
+    with process:
+        peaks = [peak() for _ in range(36) if process.stdout.readline()]
+        process.stdout.read(), process.stderr.read()
+    assert process.returncode == 0
+    # Twelve more photos come: were they kept, if only as they are in their files, they would be twelve of these.
+    assert max(peaks) - peaks[12] < 4 * (640 * 640 * 3)
 
 
 def test_the_journal_cannot_be_written(shop, tmp_path):

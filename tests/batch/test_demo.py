@@ -28,7 +28,7 @@ def pixels(path):
 def test_every_file_it_names_is_there_and_no_other(made):
     folder, said = made
     assert said["folder"] == str(folder.resolve())
-    assert sorted(said["files"]) == sorted(p.name for p in folder.iterdir())
+    assert sorted(said["files"]) == sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
     assert json.loads(json.dumps(said, allow_nan=False)) == said
     for name in ("astronaut", "coffee"):
         colorways = [f for f in said["reports"] if f.startswith(name)]
@@ -84,11 +84,24 @@ def test_command_says_where_and_replaces_an_earlier_demo(tmp_path, capsys):
     out, err = capsys.readouterr()
     assert err == ""
     wrote = re.search(r"Wrote (\d+) files to (.+); start with contact-sheet\.png", out)
-    assert int(wrote[1]) == len(list(folder.iterdir()))
+    assert int(wrote[1]) == sum(path.is_file() for path in folder.rglob("*"))
     assert Path(wrote[2]) == folder.resolve()
     assert "public domain" in out
     assert "CC0" in out
     assert pixels(folder / "contact-sheet.png").shape[2] == 3
+
+
+def test_catalog_is_that_of_the_guide_and_runs(made, tmp_path, capsys):
+    folder, _ = made
+    guide = (Path(demo.__file__).parents[1] / "docs" / "catalog.md").read_text()
+    assert (folder / "suit.toml").read_text() in guide
+    row = (folder / "catalog.csv").read_text().splitlines()[1].replace(",", " | ", 4)
+    assert all(cell in guide.replace("\\|", "|") for cell in row.split(" | "))
+    catalog = [str(folder / "suit.toml"), str(folder / "catalog.csv"), "--out", str(tmp_path / "finished")]
+    assert main(["batch", *catalog, "--check"]) == 0
+    assert main(["batch", *catalog, "--max-error", "6", "--allow-warnings", "--quiet"]) == 0
+    assert len(list((tmp_path / "finished").glob("*.jpg"))) == 5
+    assert capsys.readouterr().err == ""
 
 
 def test_folder_that_cannot_be(tmp_path, capsys):

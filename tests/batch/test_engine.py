@@ -3,12 +3,14 @@
 import contextlib
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
@@ -59,6 +61,44 @@ def test_a_stop_drops_what_has_not_begun():
     assert len(begun) <= 6
 
 
+def test_an_executor_that_is_gone_is_not_waited_for():
+    class Gone(ThreadPoolExecutor):
+        def submit(self, *_):
+            return Future()
+
+    found = engine.run(range(3), int, lambda: Gone(1), 1, lambda task, reason: reason, alive=lambda: False)
+    with pytest.raises(engine.LostError, match="is gone"):
+        list(found)
+
+
+def test_an_executor_that_takes_no_more_is_told():
+    pool = ThreadPoolExecutor(1)
+
+    def work(k):
+        pool.shutdown(wait=False)
+        return k
+
+    found = engine.run(range(9), work, lambda: pool, 1, lambda task, reason: reason)
+    with pytest.raises(engine.LostError, match="No more work can be handed out"):
+        list(found)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted in /proc")
+def test_workers_calculate_with_their_share_of_threads():
+    # In a process of its own, whose fork server no other test has started.
+    script = """
+from dyehouse.batch import engine
+square = "__import__('numpy').ones((900, 900))"
+count = f"[{square} @ {square}, len(__import__('os').listdir('/proc/self/task'))][1]"
+if __name__ == "__main__":
+    with engine.processes(2, 1, bool)() as pool:
+        print(pool.submit(eval, count).result())
+"""
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "2\n"  # one that works, and one that waits for the end of the run
+
+
 def test_only_the_task_that_kills_its_worker_fails():
     # Builtins, as a worker process cannot import a test.
     executor = engine.processes(2, 1, bool)
@@ -102,7 +142,7 @@ def free_port():
 
 @pytest.fixture
 def machines(tmp_path):
-    """A scheduler and two workers, each a process of its own; gives the address and the workers."""
+    """A scheduler and two workers, each a process of its own; gives address, workers and scheduler."""
     address = f"tcp://127.0.0.1:{free_port()}"
     environment = os.environ | {"DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "10s"}
     with contextlib.ExitStack() as stack:
@@ -116,13 +156,13 @@ def machines(tmp_path):
             stack.callback(process.kill)
             return process
 
-        start("distributed.cli.dask_scheduler", "--port", address.rpartition(":")[2], "--no-dashboard")
+        scheduler = start("distributed.cli.dask_scheduler", "--port", address.rpartition(":")[2], "--no-dashboard")
         options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path))
-        yield address, [start("distributed.cli.dask_worker", address, *options) for _ in range(2)]
+        yield address, [start("distributed.cli.dask_worker", address, *options) for _ in range(2)], scheduler
 
 
 def test_a_worker_of_a_cluster_killed_midway(tmp_path, product, machines, capsys):
-    address, workers = machines
+    address, workers, _ = machines
     table = catalog(tmp_path / "shop", product, 8, size=160)
     assert main(["batch", str(table), "--out", str(tmp_path / "own"), "--workers", "0"]) == 0
     jobs, problems = gather([str(table)])
@@ -139,6 +179,29 @@ def test_a_worker_of_a_cluster_killed_midway(tmp_path, product, machines, capsys
     assert files_of(tmp_path / "out") == files_of(tmp_path / "own")
 
 
+def test_a_cluster_that_is_lost_midway(tmp_path, product, machines):
+    address, _, scheduler = machines
+    table = catalog(tmp_path / "shop", product, 12, size=160)
+    arguments = ["batch", str(table), "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-m", "dyehouse", *arguments, "--json", "--scheduler", address]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.readline()
+        scheduler.kill()
+        try:
+            said, err = process.communicate(timeout=120)
+        finally:
+            process.kill()
+    assert process.returncode == 2
+    assert "Traceback" not in err
+    summary = json.loads(said.splitlines()[-1])["summary"]
+    assert summary["done"] < 24
+    assert re.search("The scheduler is gone|No more work can be handed out", summary["stopped"])
+    assert "go on with --resume" in summary["stopped"]
+    assert main([*arguments, "--resume", "--workers", "0"]) == 0
+    assert main(["batch", str(table), "--out", str(tmp_path / "own"), "--workers", "0"]) == 0
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "own")
+
+
 def test_a_scheduler_that_is_not_there(tmp_path, shop, capsys, monkeypatch):
     monkeypatch.setattr(engine, "_REACHED", 1)
     address = f"tcp://127.0.0.1:{free_port()}"
@@ -150,5 +213,5 @@ def test_a_scheduler_that_is_not_there(tmp_path, shop, capsys, monkeypatch):
 
 def test_without_dask(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(FileError, match=r"pip install 'dyehouse\[cluster\]'"), engine.cluster("tcp://x:1"):
+    with pytest.raises(FileError, match=r"pip install distributed"), engine.cluster("tcp://x:1"):
         pass

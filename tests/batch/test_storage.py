@@ -126,7 +126,7 @@ def test_a_journal_cannot_be_at_a_url(plain, memory, capsys):
 def test_without_fsspec(plain, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "fsspec.core", None)
     assert batch(plain[0], "--out", "memory://done", "--journal", "x") == 2
-    assert "pip install 'dyehouse[cloud]'" in capsys.readouterr().err
+    assert "pip install 'fsspec[http]'" in capsys.readouterr().err
 
 
 def test_a_kind_of_url_that_nobody_knows():

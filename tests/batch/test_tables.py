@@ -2,9 +2,11 @@
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
+from dyehouse.batch import tables
 from dyehouse.batch.jobs import gather
 from dyehouse.core.errors import DyehouseError
 from dyehouse.core.recipe import Colorway
@@ -55,7 +57,7 @@ def test_a_row_is_a_photo_and_a_colorway(ask, tmp_path):
     (want,) = first.wants
     assert want.colorway == Colorway("navy", (NAVY,))
     assert want.output == "a-navy.png"
-    assert want.source.endswith("t.csv', row 2")
+    assert str(want.source).endswith("t.csv', row 2")
     assert second.wants[0].colorway.name == "#fff"
 
 
@@ -124,7 +126,7 @@ def test_patterns_of_photos(ask, tmp_path):
     assert not problems
     assert sorted(job.wants[0].output for job in jobs) == sorted(["b-1.png", "b-2.png", f"{tmp_path.name}-größe.png"])
     assert ask(t__csv="photo,target\nno/*.png,#fff\n")[1] == [
-        f"'{tmp_path / 't.csv'}', row 2: no photo matches 'no/*.png': check folder and name."
+        f"'{tmp_path / 't.csv'}', row 2, column 'photo': no photo matches 'no/*.png': check folder and name."
     ]
 
 
@@ -136,7 +138,7 @@ def test_what_spreadsheets_write(ask, separator, encoding, ends):
     jobs, problems = ask(t__csv=ends.join(lines).replace(",", separator).encode(encoding))
     assert not problems
     assert [job.photo.rpartition("/")[2] for job in jobs] == ["größe 鞋.png", "b.png"]
-    assert jobs[1].wants[0].source.endswith("row 5")
+    assert jobs[1].wants[0].source.row == 5
 
 
 def test_mixed_encodings_name_their_lines(ask):
@@ -152,6 +154,7 @@ def test_mixed_encodings_name_their_lines(ask):
         ("photo,target\n", "has no rows"),
         ("foto,target\na,#fff", "row 1, column 'foto': this is not known: did you mean 'photo'"),
         ("photo,photo\na,b", "row 1, column 'photo': there are two columns of this name"),
+        ("\n\nfoto,target\na.png,#fff", "row 3, column 'foto': this is not known"),
         ("photo,target\na.png,#fff,3", "row 2: there are 3 cells for 2 columns: quote"),
         ("photo,target\na.png,snow", "row 2, column 'target': Target 'snow' is not a color"),
         ("photo,target,click\na.png,#fff,10", "row 2, column 'click': click is .10.: write a pixel as two"),
@@ -170,6 +173,11 @@ def test_mixed_encodings_name_their_lines(ask):
         ("photo,target,output\na.png,#fff,sheets/a.png", "folder of the run's own"),
         ("photo,target,output\na.png,#fff,.dyehouse-1.png", "looks like an unfinished file"),
         (f"photo,target,output\na.png,#fff,{'x' * 300}.png", "more than 255 bytes: shorten"),
+        ("photo,target,output\na.png,#fff,a.png\nb.png,#fff,./a.png", "row 3, column 'output': .*'a.png' is also the"),
+        ("photo,target,output\na.png,#fff,x//a.png\nb.png,#fff,x\\a.png", "row 3, .*'x/a.png' is also the output of"),
+        ("photo,target,output\na.png,#fff,a.png\nb.png,#fff,A.png/b.png", "'A.png/b.png' would be a file and a folder"),
+        ("photo,target,output\na.png,#fff,x.png/a.png\nb.png,#fff,x.png", "row 3, .* would be a file and a folder"),
+        ("photo,target,output,compression\na.png,#fff,a.png,zip", "column 'compression': 'a.png' takes no compression"),
         ("photo\na.png", "row 2, column 'target': there is no color"),
         ("target\n#fff", "row 2: no photo is named"),
         ("photo,colorway\na.png,navy", "column 'colorway': colorway 'navy' is not in the recipe"),
@@ -194,6 +202,13 @@ def test_problems_of_csv(ask, table, words):
         ("{", "row 1: this is not JSON"),
         ("[1]", "row 1: this is no object"),
         ('{"foto": 1}', "column 'foto': this is not known: did you mean 'photo'"),
+        ('{"photo": ["a.png"], "target": "#fff"}', "column 'photo': photo is .* write a text in quotes"),
+        (r'{"photo": "a\u0000.png", "target": "#fff"}', "column 'photo': .* which no file can be called"),
+        (r'{"photo": "\ud800.png", "target": "#fff"}', "column 'photo': .* which no file can be called"),
+        (r'{"photo": "a.png", "target": "#fff", "colorway": "\ud800"}', "is a name that no file can have"),
+        ('{"photo": "a.png", "target": "#fff", "colorway": ["x"]}', "column 'colorway': .* is no name"),
+        ('{"photo": "a.png", "recipe": {}}', "column 'recipe': recipe is {}: write a text in quotes"),
+        ('{"photo": "a.png", "colorways": [["x", "#fff"]]}', "column 'colorways': .* is no name: write names"),
         ('{"photo": "a.png", "target": 3}', "column 'target': target is 3"),
         ('{"photo": "a.png", "colorways": 3}', "column 'colorways': write names"),
         ('{"photo": "a.png", "target": "#fff", "click": "10,20"}', "column 'click': click is '10,20'"),
@@ -203,6 +218,27 @@ def test_problems_of_json_lines(ask, line, words):
     _, problems = ask(t__jsonl=line)
     assert len(problems) == 1, problems
     assert re.search(words, problems[0]), problems[0]
+
+
+def test_line_ends_of_text_are_no_ends_of_rows(ask):
+    text = "photo,target,colorway\r\na.png,#fff,one\u2028two\x85three\r\nb.png,#fff,four\r\n"
+    for encoding in ("utf-8", "utf-16"):
+        jobs, problems = ask(t__csv=text.encode(encoding))
+        assert not problems
+        assert [job.wants[0].colorway.name for job in jobs] == ["one\u2028two\x85three", "four"]
+
+
+def test_tables_whose_columns_cannot_be_read(ask):
+    (said,) = ask(t__csv="photo,target\na.png,#fff\n".encode("utf-16-le"))[1]
+    assert "t.csv': this is UTF-16 without a byte order mark: save the table again" in said
+    (said,) = ask(t__csv=b"f\xf6to,target\na.png,#fff\nb.png,#fff\n")[1]
+    assert "t.csv', row 1: this is not UTF-8 text" in said
+
+
+def test_names_from_urls_are_without_their_queries(ask):
+    jobs, problems = ask(t__csv="photo,target\nhttps://x.y/a/shoe.jpg?width=1.5&v=2,#fff\n")
+    assert not problems
+    assert jobs[0].wants[0].output == "shoe-#fff.png"
 
 
 def test_every_problem_is_told(ask):
@@ -228,6 +264,7 @@ def test_bad_recipes_and_other_files(ask, tmp_path):
     assert "neither a recipe nor a table" in ask(r__txt="x")[1][0]
     assert "cannot be read" in str(gather([str(tmp_path / "no.csv")])[1][0])
     assert "No file matches" in str(gather([str(tmp_path / "no*.csv")])[1][0])
+    assert "copy it here" in str(gather(["s3://shop/catalog.csv"])[1][0])
 
 
 def test_a_large_table_is_checked_row_by_row(ask):
@@ -258,3 +295,9 @@ def test_a_measured_light_is_relative_to_its_table_and_an_input(ask, tmp_path):
     assert jobs[0].inputs == [str(tmp_path / "a.png"), str(tmp_path / "lamp.csv")]
     assert len(problems) == 1
     assert re.search(r"row 3, column 'white'.*gone\.csv.*cannot be read", problems[0]), problems
+
+
+def test_the_page_names_every_key():
+    page = (Path(tables.__file__).parents[1] / "docs" / "catalog.md").read_text()
+    keys = {*tables._KEYS, "format", "name", "targets", "pattern"}
+    assert not {key for key in keys if f"`{key}`" not in page}

@@ -30,8 +30,8 @@ def test_figures_of_a_patch(tmp_path):
     asked, delivered = lab_of_codes((0x1F, 0x4E, 0x79)), lab_of_codes((40, 80, 120))
     np.testing.assert_allclose((found.asked, found.delivered), (asked, delivered), atol=1e-4)
     assert found.ciede2000 == pytest.approx(colour.delta_E(asked, delivered, method="CIE 2000"), abs=1e-4)
-    assert found.cmc(2) == pytest.approx(colour.delta_E(asked, delivered, method="CMC", l=2, c=1), abs=1e-4)
-    assert found.cmc(1) == pytest.approx(colour.delta_E(asked, delivered, method="CMC", l=1, c=1), abs=1e-4)
+    assert found.cmc[0] == pytest.approx(colour.delta_E(asked, delivered, method="CMC", l=2, c=1), abs=1e-4)
+    assert found.cmc[1] == pytest.approx(colour.delta_E(asked, delivered, method="CMC", l=1, c=1), abs=1e-4)
     assert f"Delivered {found.ciede2000:.1f} of the asked color" in found.sentence
     assert found.limit == 0
     assert found.as_dict()["target"] == "#1F4E79"
@@ -115,6 +115,18 @@ def test_every_region_by_its_own_pixels(product, opened, tmp_path):
     assert [f.target for f in found] == ["#1F4E79"] * len(found)
     assert len(found) >= 1
     assert all(f.ciede2000 < 0.3 for f in found)
+
+
+def test_the_first_rows_that_have_enough_matte_pixels_are_looked_at(product, opened):
+    scene = product(size=400, noise=0.0)
+    scene.image[scene.mask == 1] = scene.body  # matte all over
+    source = opened(scene)
+    expected = verification.expect(source, photo.look(source, Recipe((Region(TEAL, mask=scene.mask),))))
+    ((area, _, _),) = expected.asked
+    first = np.flatnonzero(scene.mask.any(axis=1))[0]
+    assert len(area.rows) == 400
+    assert first <= area.rows.min() <= area.rows.max() < first + 60
+    assert (scene.mask[area.rows, area.columns] == 1).all()
 
 
 def test_another_light_and_no_target(product, opened, tmp_path):

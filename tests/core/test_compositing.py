@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dyehouse.core import analyze, transfer
-from dyehouse.core.compositing import refine_outline, rim_left_out, spill_weights
+from dyehouse.core.compositing import Sides, refine_outline, rim_left_out, spill_weights
 from dyehouse.core.neighborhood import dilate, erode
 from dyehouse.core.picture import Picture
 from dyehouse.core.recolor import RegionMatrix, recolor
@@ -107,12 +107,14 @@ def test_a_mask_that_is_a_few_pixels_wrong(composite, ground, wrong):
 def test_the_width_of_a_rim_that_the_mask_leaves_out(composite, ground):
     _, cover, product, _ = composite
     picture = Picture((cover[..., None] * product + (1 - cover[..., None]) * ground).astype(np.float32))
-    widths = [
-        rim_left_out(picture, erode(cover > 0.5, wrong).astype(np.float32), BODY, np.ones(3)) for wrong in (0, 1, 2)
-    ]
+
+    def width(mask):
+        return rim_left_out(picture, Sides.of(mask), BODY, np.ones(3))
+
+    widths = [width(erode(cover > 0.5, wrong).astype(np.float32)) for wrong in (0, 1, 2)]
     np.testing.assert_allclose(np.diff(widths), 1, atol=0.2)
-    assert rim_left_out(picture, cover, BODY, np.ones(3)) < 0.2
-    assert rim_left_out(picture, np.ones(cover.shape), BODY, np.ones(3)) == 0
+    assert width(cover) < 0.2
+    assert width(np.ones(cover.shape)) == 0
 
 
 def test_a_mask_through_the_middle_of_a_product_is_meant_so(composite):
@@ -122,7 +124,8 @@ def test_a_mask_through_the_middle_of_a_product_is_meant_so(composite):
     assert not changed[:, 50:].any()
 
 
-def test_spill_moves_the_light_on_a_neutral_surround_and_nothing_else():
+@pytest.mark.parametrize("model", ["dichromatic", "body", "regularized"])
+def test_spill_moves_the_light_on_a_neutral_surround_and_nothing_else(model):
     y, x = np.mgrid[:80, :120].astype(float)
     cover = (np.hypot(x - 60, y - 40) < 20).astype(float)
     glow = 0.15 * np.exp(-((np.hypot(x - 60, y - 40) - 20).clip(0) / 4))[..., None]
@@ -130,7 +133,7 @@ def test_spill_moves_the_light_on_a_neutral_surround_and_nothing_else():
     surround = np.where((x > 105)[..., None], blue, gray + glow * BODY)
     photo = np.where(cover[..., None] == 1, BODY, surround).astype(np.float32)
     truth = np.where(cover[..., None] == 1, TARGET, np.where((x > 105)[..., None], blue, gray + glow * TARGET))
-    ours = analyze(photo, None, BODY, cover, "dichromatic", spill=True).recolor(TARGET)
+    ours = analyze(photo, None, BODY, cover, model, spill=True).recolor(TARGET)
     np.testing.assert_allclose(ours, truth, atol=2e-3)
     np.testing.assert_array_equal(ours[x > 105], photo[x > 105])
 
@@ -180,6 +183,14 @@ def test_a_product_of_the_lights_color_keeps_to_its_mask():
     assert np.abs(edge.share - truth).max() < 0.02
 
 
+def test_pixels_that_are_all_the_products_are_not_listed(composite):
+    _, cover, product, _ = composite
+    photo = (cover[..., None] * product + (1 - cover[..., None]) * 0.3).astype(np.float32)
+    edge = edge_of(photo, cover)
+    assert (cover[edge.rows, edge.columns] < 1).all()
+    assert len(edge.rows) == np.count_nonzero((cover > 0) & (cover < 1))
+
+
 def test_a_mask_without_an_outline_has_no_edge():
     image = np.full((9, 9, 3), 0.3, np.float32)
     assert edge_of(image, np.ones((9, 9))) is None
@@ -190,7 +201,7 @@ def test_edge_of_a_tall_picture_is_in_row_order_and_found_by_rows():
     # Tall enough for several strips.
     rng = np.random.default_rng(0)
     mask = np.where(rng.random((3000, 400)) < 0.01, 0.5, 0.0)
-    mask[::2, ::3] = np.where(mask[::2, ::3] == 0, 1, mask[::2, ::3])
+    mask[::2, ::3] = np.where(mask[::2, ::3] == 0, 0.9, mask[::2, ::3])
     image = rng.random((3000, 400, 3), dtype=np.float32)
     edge = edge_of(image, mask)
     np.testing.assert_array_equal(np.column_stack([edge.rows, edge.columns]), np.argwhere(mask > 0))

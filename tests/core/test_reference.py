@@ -115,6 +115,30 @@ def test_gloss_under_a_click_does_not_depend_on_exposure(product):
     np.testing.assert_allclose(four.color, 4 * one.color, rtol=1e-5)
 
 
+@pytest.mark.parametrize("noise", [0.02, 0.06, 0.15])
+def test_gloss_that_noise_makes_is_left_in_the_reference(product, noise):
+    scene = product(size=200, noise=noise)
+    rows, columns = np.nonzero((scene.mask == 1) & (scene.gloss < 0.002) & (scene.image.mean(axis=2) > 0.1))
+    chosen = np.random.default_rng(0).choice(len(rows), 40, replace=False)
+    clicks = [(int(columns[k]), int(rows[k])) for k in chosen]
+    read, found = (
+        np.mean([angle(f(Picture(scene.image), click, scene.white, scene.mask).color, scene.body) for click in clicks])
+        for f in (r.reference_at, r.matte_at)
+    )
+    assert found < 1.1 * read
+
+
+def test_grain_of_a_cloth_is_not_its_matte_edge():
+    # Yarns of more and less gloss: the reference is their mean, as a window reads it, and not the most matte yarn.
+    rng = np.random.default_rng(0)
+    body, size = np.array(BODIES[0]), 120
+    gloss = rng.uniform(0, 0.02, (size, size, 1))
+    image = (rng.uniform(0.7, 1, (size, size, 1)) * body + gloss).astype(np.float32)
+    found = r.matte_reference(Picture(image), np.ones(3)).color
+    a, b = np.linalg.pinv(np.column_stack([body, np.ones(3)])) @ found
+    assert b / a == pytest.approx(0.01 / 0.85, abs=0.004)
+
+
 def test_window_is_kept_inside_picture_and_mask():
     image = np.zeros((10, 10, 3), np.float32)
     image[:, :5], image[:, 5:] = [0.5, 0.1, 0.1], [0.1, 0.1, 0.5]

@@ -109,6 +109,31 @@ def test_rounding_to_codes_is_noise_and_what_compression_leaves_is_more():
     assert flat > 1.5 * stepped
 
 
+@pytest.mark.parametrize("bits", [5, 8])
+@pytest.mark.parametrize("curve", [transfer.SRGB, transfer.LINEAR], ids=["srgb", "linear"])
+def test_codes_are_noise_in_a_float_picture_too(bits, curve):
+    smooth = scene(RED, gloss=0.2, size=128)
+    top = 2**bits - 1
+    decoded = Picture(np.asarray(curve.decode(np.round(curve.encode(smooth) * top) / top), np.float32))
+    light = np.array(0.45)
+    step = np.diff(curve.decode(np.round(curve.encode(np.array([0.4])) * top + [[0], [1]]) / top), axis=0).item()
+    assert noise_across(Picture(smooth), RED, WHITE).at(light) < 1e-4
+    assert 0.1 * step < noise_across(decoded, RED, WHITE).at(light) < step
+    assert choose(decoded, RED, WHITE, None).mixture.model not in ("lights", "metal")
+
+
+@pytest.mark.parametrize("channel", range(3))
+@pytest.mark.parametrize("error", [-0.3, -0.15, 0.15, 0.3])
+def test_a_wrong_white_is_no_other_light_and_no_metal(channel, error):
+    white = WHITE.copy()
+    white[channel] += error
+    for gloss in (0.4, 0.02):
+        photo = scene(RED, gloss=gloss, size=128)
+        photo += np.float32(gloss / 4) * np.linspace(0, 1, 128, dtype=np.float32)[:, None]
+        evidence = choose(Picture(photo), RED, white, None)
+        assert evidence.mixture.model in ("dichromatic", "bounce"), evidence.figures
+
+
 def test_a_ground_of_one_code_is_no_compression():
     codes = 255 * transfer.SRGB.encode(scene(RED, size=128, noise=0.004))
     cut_out = np.concatenate([codes, np.full((128, 256, 3), 240.0)], axis=1)

@@ -71,12 +71,13 @@ def test_it_is_the_minimum_of_the_sum_it_says():
     st.floats(1e-10, 0.1),
     st.booleans(),
     st.booleans(),
+    st.booleans(),
 )
-def test_it_moves_continuously_and_stays_finite(body, light, y1, y2, variance, bounce, gloss):
+def test_it_moves_continuously_and_stays_finite(body, light, y1, y2, variance, bounce, gloss, doubted):
     axes = frame(np.array(body), 0.55)
     light = np.array([light, light * (1 + 1e-6)])
     across = np.array([[y1, y1 + 1e-7], [y2, y2 - 1e-7]])
-    for values in split(light, across, np.full(2, variance), axes, bounce, gloss)[:2]:
+    for values in split(light, across, np.full(2, variance), axes, bounce, gloss, doubted=doubted)[:2]:
         assert np.isfinite(values).all()
         assert abs(values[1] - values[0]) < 1e-2 * max(1, np.abs(values).max())
 
@@ -90,6 +91,22 @@ def test_what_the_noise_does_not_prove_is_none():
     assert (found == 0).mean() > 0.9
     raw = matte[0] / axes.white[1]
     assert np.abs(found).mean() < 0.1 * np.abs(raw).mean()
+
+
+def test_gloss_and_bounce_that_make_up_for_each_other_are_none_where_noise_explains_them():
+    axes = frame(np.array(BODIES["pale"]), 0.55)
+    rng = np.random.default_rng(0)
+    light, variance = np.ones(5000), np.full(5000, 0.004**2)
+    noise = rng.normal(0, 0.004, (2, 5000))
+    # Without a price on each, noise makes both; with it, neither.
+    plain, sure = (split(light, noise, variance, axes, bounce=True, doubted=d)[:2] for d in (False, True))
+    assert all(np.abs(after).mean() < 0.5 * np.abs(before).mean() for before, after in zip(plain, sure, strict=True))
+    # What there is, stays; both together, where there is little noise.
+    for b, c, grain in ((0.1, 0.0, 1.0), (0.0, 0.2, 1.0), (0.2, 0.4, 0.01)):
+        across = b * np.array(axes.white[1:])[:, None] + c * np.array(axes.bounce[1:])[:, None] + grain * noise
+        gloss, bounce, _ = split(light, across, grain**2 * variance, axes, bounce=True, doubted=True)
+        assert np.median(gloss) == pytest.approx(b, abs=0.02)
+        assert np.median(bounce) == pytest.approx(c, abs=0.05)
 
 
 def test_no_more_gloss_than_light():

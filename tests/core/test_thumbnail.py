@@ -1,6 +1,7 @@
 """A thumbnail looks like the full picture made small."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def test_it_is_the_recolored_picture_made_small(size: int, product: Callable) ->
     other = prepared.for_colorway(Colorway("red", (parse_target("#902020"),)))
     for asked in (prepared, other):
         full, _ = recolor(asked.analyses[0].picture, asked.regions())
-        step = full.shape[0] // small.picture.shape[0]
+        step = full.shape[0] // small.codes.shape[0]
         expected = transfer.encode(shrink(Picture(full), step).clip(0, 1), SRGB.curve, np.uint8)
         made = thumbnail.thumbnail(small, asked)
         assert max(made.shape) <= 96
@@ -42,3 +43,28 @@ def test_it_is_in_srgb_whatever_the_photo_is(product: Callable) -> None:
     x, y = scene.matte
     for picture in made:
         assert np.abs(picture[y, x].astype(int) - 119).max() <= 3  # lab(50, 0, 0) is #777777
+
+
+def test_a_region_that_keeps_its_color_is_left_as_it_is(product: Callable) -> None:
+    scene = product(noise=0.01)
+    mine = Region(parse_target("#902020"), reference=scene.matte, mask=scene.mask, model="regularized")
+    prepared = prepare(Picture(scene.image), Recipe((mine,)), space=LINEAR_SRGB)
+    assert prepared.analyses[0].extra is not None
+    kept = replace(prepared, recipe=replace(prepared.recipe, regions=(replace(mine, target=None),)))
+    small = thumbnail.proxy_of(prepared)
+    np.testing.assert_array_equal(thumbnail.thumbnail(small, kept), small.codes)
+    made = thumbnail.thumbnail(small, prepared)
+    inside = scene.mask > 0
+    np.testing.assert_array_equal(made[~inside], small.codes[~inside])
+    assert (made[inside] != small.codes[inside]).any(axis=1).mean() > 0.9
+
+
+def test_a_mask_that_vanishes_when_it_is_made_small(product: Callable) -> None:
+    scene = product(size=203)
+    corner = np.zeros((203, 203))
+    corner[:, 201:] = 1  # blocks of 2 leave the last column out
+    corner[:, 201] = 0
+    region = Region(parse_target("#902020"), reference=(0.3, 0.2, 0.1), mask=corner, model="body")
+    prepared = prepare(Picture(scene.image), Recipe((region,)), space=LINEAR_SRGB)
+    small = thumbnail.proxy_of(prepared, 100)
+    assert np.abs(thumbnail.thumbnail(small, prepared).astype(int) - small.codes).max() <= 1

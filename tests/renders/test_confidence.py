@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dyehouse.benchmarks.calibration import BAD, CAMERAS, GOOD, cases, rank_correlation, scores
+from dyehouse.benchmarks.camera import Camera
 from dyehouse.benchmarks.speed_accuracy import FAILURES, WELL_BEHAVED, pairs
 from dyehouse.core import analyze
 
@@ -34,9 +35,11 @@ def test_nine_tenths_of_pixels_are_below_their_bounds(found):
 
 
 def test_what_is_bad_is_flagged_and_what_is_good_is_not(found):
-    score = scores(found)
-    assert score.bad >= 4
+    worse = {"six stops under": Camera(exposure=1 / 64), "few electrons": Camera(electrons=300)}
+    score = scores([*found, *cases((*WELL_BEHAVED, *FAILURES), FAST, worse, COLORS)])
+    assert score.bad >= 6
     assert score.bad_flagged == score.bad
+    score = scores(found)
     assert score.good > 120
     assert score.good_flagged <= 0.05 * score.good
 

@@ -62,12 +62,13 @@ def test_a_mask_that_is_too_tight_is_told_and_no_other(scene):
         assert all(warns(erode(true, pixels)) for pixels in (1, 2, 3))
 
 
-def test_bleeding_on_a_neutral_surround_moves_along():
-    found = [surround(pair, spill=True) for pair in pairs("color_bleeding", FAST, COLORS)]
+@pytest.mark.parametrize("scene", ["color_bleeding", "folds"])
+def test_bleeding_on_a_neutral_surround_moves_along(scene):
+    found = [surround(pair, spill=True) for pair in pairs(scene, FAST, COLORS)]
     median, high = np.mean(found, axis=0)
     assert median <= 0.3
     assert high <= 1.5
-    left = np.mean([surround(pair, spill=False) for pair in pairs("color_bleeding", FAST, COLORS)], axis=0)
+    left = np.mean([surround(pair, spill=False) for pair in pairs(scene, FAST, COLORS)], axis=0)
     assert left[0] > 5 * median
     assert left[1] > 5 * high
 

@@ -20,7 +20,7 @@ def test_gloss_in_the_click_does_not_ruin_a_flat_swatch():
     assert max(c.gloss for c in found) > 0.04
     assert np.mean([c.median for c in found]) < 0.6
     assert np.mean([c.high for c in found]) < 2.2
-    assert max(c.median for c in found) < 2.5
+    assert max(c.median for c in found) < 1
     # The bar of the issue, and what it was before.
     assert np.quantile([c.median for c in found], 0.8) < 1
     assert np.mean([c.read_median for c in found]) > 5 * np.mean([c.median for c in found])
@@ -69,11 +69,7 @@ def test_reference_and_white_found_cost_little_or_it_asks():
     costs = np.array([f.both - f.true for f in found])
     unsaid = np.array([not f.asks for f in found])
     assert np.median(costs) < 0.17
-    # Of cloth every pixel has a trace of gloss: its matte edge is 0.3 % of the white away from its mean.
-    assert {f.scene for f, cost in zip(found, costs, strict=True) if cost > 0.2} - {
-        f.scene for f in found if f.asks
-    } <= {"fabric_cylinder"}
-    assert costs[unsaid].max() < 0.5
+    assert costs[unsaid].max() <= 0.2
 
 
 def test_confidence_in_a_white_is_the_chance_that_it_is_right():

@@ -8,7 +8,8 @@ import pytest
 
 from dyehouse.benchmarks import ladder
 from dyehouse.benchmarks.camera import Camera
-from dyehouse.benchmarks.ladder import BEST, CASES, METALS, NEUTRAL, PALE, Case, measure, trials
+from dyehouse.benchmarks.laboratory import Settings
+from dyehouse.benchmarks.ladder import BEST, CASES, METALS, NEUTRAL, PALE, Case, in_bands, measure, trials
 from dyehouse.benchmarks.speed_accuracy import difference
 from dyehouse.core.neighborhood import dilate
 
@@ -53,6 +54,13 @@ def test_pale_folds_are_ruined_by_the_plain_model_and_not_by_auto():
         assert figures["dichromatic"][1] > 20
         assert figures["auto"][0] <= bars[0]
         assert figures["auto"][1] <= bars[1]
+
+
+@pytest.mark.slow
+def test_folds_of_a_saturated_spectrum_are_not_taken_for_metal():
+    figures = in_bands("folds", Settings(size=128, samples=64), ("yellow", "blue"))
+    assert figures["auto"][0] < 0.8 * figures[BEST][0]
+    assert figures["auto"][1] < 0.8 * figures[BEST][1]
 
 
 @pytest.mark.parametrize(
