@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -191,6 +192,9 @@ def cluster(address: str) -> Iterator[tuple[Callable[[], Executor], int, Callabl
         from distributed import Client
     except ImportError:
         raise FileError("A scheduler needs dask.distributed, which is not installed: pip install distributed") from None
+    # Of a scheduler that is lost its own threads log tracebacks; what has happened is told in words.
+    for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     with contextlib.ExitStack() as stack:
         try:
             client = stack.enter_context(Client(address, timeout=_REACHED))

@@ -507,7 +507,7 @@ GROUPS: dict[str, tuple[tuple[Callable[[Settings], Curve], str], ...]] = {
         (
             bit_depth,
             "An sRGB file of common depth costs next to nothing; linear codes of as few bits are coarse in the dark. "
-            "Below seven bits the program reads gloss and bounce out of the steps, and the plain model does better.",
+            "At four bits of sRGB the plain model does better.",
         ),
         (
             exposure,
@@ -529,8 +529,8 @@ GROUPS: dict[str, tuple[tuple[Callable[[Settings], Curve], str], ...]] = {
         ),
         (
             white_error,
-            "The white matters in the highlights only. One that is wrong by more than a tenth leaves something off the "
-            "plane, which the program takes for other light than there is: the plain model does better then.",
+            "The white matters in the highlights only. One that is wrong by more than a tenth tilts the plane; this is "
+            "recognized, and the plain model kept.",
         ),
         (
             random_reference,
