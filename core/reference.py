@@ -193,7 +193,7 @@ def _readings(picture: Picture, mask: NDArray | None, near: tuple[int, int] | No
         right, bottom = width, height
     else:
         reach = max(8, round(0.12 * max(height, width)))
-        step = max(1, reach // 60)
+        step = max(1, reach // 25)
         (left, right), (top, bottom) = ((max(0, k - reach), k + reach) for k in near)
     rows, columns = np.nonzero(wanted[top:bottom:step, left:right:step])
     rows, columns = top + step * rows, left + step * columns

@@ -263,7 +263,7 @@ def _lit(
         return None, other
     if figures["residual"] > _OTHER_LIGHT[1] or figures["bounce"] > _MOST_BOUNCE:
         return mixture.metal(body, white), None
-    return mixture.mapped("bounce", body, white, interreflection.USUAL), None
+    return None, other
 
 
 # --- What is looked at --------------------------------------------------------------------------------------
