@@ -176,7 +176,8 @@ def matte_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray |
     around = read_window(picture, check_pixel(picture, pixel, "Reference pixel"), mask) / white
     noise = _as_gloss(color, float((around @ _plane(color)[0]).std()) / len(around) ** 0.5)
     low, high = np.maximum(np.array(_GLOSS_RAMP) * color.max() / max(sine(color), 1e-3), (2 * noise, 3 * noise))
-    gloss *= float(np.clip((gloss - low) / (high - low), 0, 1))
+    # No body color gives back less than nothing in a channel.
+    gloss = min(gloss * float(np.clip((gloss - low) / (high - low), 0, 1)), max(0.0, float(color.min())))
     return Reference(read.color - gloss * white, read.pixel, gloss)
 
 
