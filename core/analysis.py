@@ -17,6 +17,7 @@ from . import confidence, dichromatic, maps, stability
 from . import recolor as recoloring
 from .compositing import Edge, Sides, add_spill, refine_outline, rim_left_out, spill_weights
 from .errors import ImageError, ReferenceColorError, WhiteError
+from .interreflection import USUAL, bounced, unbounced
 from .materials import find_materials
 from .mixture import MODELS as _MODELS
 from .mixture import Mixture
@@ -38,7 +39,15 @@ _SHINES, _SATURATED, _STRONG = 0.02, 0.03, 3.0
 
 # Gloss in a clicked reference, as a share of the white, from which it is reported.
 _GLOSSY = 0.03
+
+# The same for light that had met the product before, as a share of the rest.
+_BOUNCED = 0.05
 _SAMPLE = 200_000
+
+# Share of a region that gloss and shading do not explain from which its palest color may be that of the lamps' light
+# alone; mean square of the bounce, against the usual one, that folds have at least; and the share of what was not
+# explained that another reference may leave.
+_SHOWN_BY_FOLDS, _DEEP, _MUCH_LESS = 0.06, 0.4, 0.6
 
 # Pixels that the predicted error is found at: for its map, and for the region; and those in one go.
 _MAPPED, _LOOKED_AT, _AT_ONCE = 1_000_000, 1_000, 10_000
@@ -74,6 +83,9 @@ class Analysis:
         Sentences for the user, each with a remedy.
     gloss
         Surface reflection that was found in the reference pixel and left out of `reference`, as a share of the white.
+    bounce
+        Light that had met the product before, which was found in the reference pixel and left out too: a multiple of
+        :func:`interreflection.bounced` of what `light` times is `reference`.
     spill
         Whether what shows of the product outside the selection is recolored too: its rim where the selection is too
         tight, and the light that it throws on a neutral surround.
@@ -88,16 +100,18 @@ class Analysis:
     noise_gain: float
     warnings: tuple[str, ...]
     gloss: float = 0.0
+    bounce: float = 0.0
+    light: float = 1.0
     spill: bool = False
 
     def matte_target(self, color: ArrayLike, target_white: ArrayLike | None = None) -> NDArray[np.float64]:
         """(3,) target for a color that was read with its gloss, at the same place of a photo of a real sample.
 
         The paper reads its targets so. Targets are matte colors: a swatch, or what a matte pixel shall show; the
-        gloss of the reference pixel is not in them and stays on top.
+        gloss of the reference pixel is not in them and stays on top, and so does light that had met the product before.
         """
         white = self.white if target_white is None else dichromatic.as_white(target_white)
-        return dichromatic.as_target(color) - self.gloss * white
+        return unbounced(dichromatic.as_target(color) / white - self.gloss, self.bounce, self.light) * white
 
     def matrix(
         self, target: ArrayLike, target_white: ArrayLike | None = None, residual: str | float = "fade"
@@ -419,7 +433,20 @@ def analyze(
     if m is not None and not spill:
         sides = Sides.of(m)
         warnings += _rim_warnings(rim_left_out(picture, sides, found.color, w))
-    made = Analysis(picture, w, found.color, found.pixel, m, evidence, gain, tuple(warnings), found.gloss, spill)
+    made = Analysis(
+        picture,
+        w,
+        found.color,
+        found.pixel,
+        m,
+        evidence,
+        gain,
+        tuple(warnings),
+        found.gloss,
+        found.bounce,
+        found.light,
+        spill,
+    )
     made.__dict__["_sides"] = sides  # until the outline is found
     return made
 
@@ -427,15 +454,30 @@ def analyze(
 def _look(
     picture: Picture, found: Reference, white: NDArray, mask: NDArray | None, model: str
 ) -> tuple[Reference, Evidence]:
-    """Choose the model; and take the reference as it was read where folds, not gloss, set it apart from its region."""
+    """Choose the model, and the reference with it: what sets a click apart from its region may be gloss or folds."""
     evidence = choose(picture, found.color, white, mask, found.pixel, model)
-    if model in ("auto", "bounce") and found.gloss > 0 and evidence.mixture.model != "dichromatic":
+    if model not in ("auto", "bounce"):
+        return found, evidence
+    for other in found.unfolded:
+        if other.palest and evidence.broken < _SHOWN_BY_FOLDS:
+            continue
+        folds = choose(picture, other.color, white, mask, found.pixel, model)
+        if _fits_better(folds, evidence, other.palest):
+            return other, folds
+    if found.gloss > 0 and evidence.mixture.model != "dichromatic":
         # Folds are more saturated than a matte ridge, which makes it look glossy beside them.
         read = Reference(found.color + found.gloss * white, found.pixel)
         folds = choose(picture, read.color, white, mask, read.pixel, model)
-        if folds.mixture.model == "bounce" and not folds.mixture.keeps_white:
+        if folds.matte:
             return read, folds
     return found, evidence
+
+
+def _fits_better(folds: Evidence, evidence: Evidence, palest: bool) -> bool:
+    """Whether what a region shows about a reference that was parted from its bounce speaks for it."""
+    if folds.matte:
+        return not palest or folds.figures["bounce"] > _DEEP
+    return not palest and folds.broken < _MUCH_LESS * evidence.broken
 
 
 def _check_finite(picture: Picture) -> None:
@@ -484,7 +526,13 @@ def reference_warnings(found: Reference, white: NDArray, model: str = "auto") ->
             f"The reference pixel is glossy (about {found.gloss:.0%} of the white): the target is given to the matte "
             "color under it, and the gloss stays on top; click a matte part if the pixel shall read the target."
         )
-    if (found.color / white).max() < 4 * DARK:
+    body = found.color / white
+    if found.bounce * np.linalg.norm(bounced(body / found.light, USUAL)) > _BOUNCED * np.linalg.norm(body):
+        said.append(
+            "The reference pixel lies in light that the product throws on itself: the target is given to the color "
+            "that lamps alone show there; click an open, lit part if the pixel shall read the target."
+        )
+    if body.max() < 4 * DARK:
         said.append("The reference is dark, so its color is uncertain: click a better lit part.")
     return said
 

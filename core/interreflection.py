@@ -32,7 +32,7 @@ USUAL = 0.55
 _MOST = 0.9
 
 
-_CANDIDATES = USUAL * 2.0 ** np.linspace(-2.5, 2.5, 21)
+_CANDIDATES = 2.0 ** np.linspace(-2.5, 2.5, 21)
 
 
 def bounced(body: ArrayLike, feedback: float) -> NDArray[np.float64]:
@@ -53,7 +53,29 @@ def bounced(body: ArrayLike, feedback: float) -> NDArray[np.float64]:
     return rho**2 / (1 - np.minimum(feedback * rho, _MOST))
 
 
-def find_feedback(pixels: NDArray, body: NDArray, noise: NDArray, most: float = 1000) -> float:
+def unbounced(color: ArrayLike, bounce: float, light: float = 1.0, feedback: float = USUAL) -> NDArray[np.float64]:
+    """Body color in so much light of which a color is the sum with so much bounce; the inverse of :func:`bounced`.
+
+    Parameters
+    ----------
+    color
+        (3,) relative to the white.
+    bounce, light
+        Of ``light * v + bounce * bounced(v)``; >= 0 and > 0.
+    feedback
+        K, >= 0.
+
+    Returns
+    -------
+    (3,) float64 ``light * v``, relative to the white.
+    """
+    c = np.asarray(color, np.float64)
+    straight = light + feedback * c
+    v = 2 * c / (straight + np.sqrt(np.maximum(straight**2 + 4 * (bounce - light * feedback) * c, 0.0)))
+    return np.where(c > 0, light * v, c)
+
+
+def find_feedback(pixels: NDArray, body: NDArray, noise: NDArray, most: float = 1000, usual: float = USUAL) -> float:
     """Find K of a matte product from the colors of its folds.
 
     With the right K all pixels lie in the plane of the body color and its bounce. An exposure that is unknown, so that
@@ -69,22 +91,24 @@ def find_feedback(pixels: NDArray, body: NDArray, noise: NDArray, most: float = 
         (n,) standard deviation of the pixels.
     most
         Number of pixels that count as independent of each other: what the model misses, it misses in all of a fold.
+    usual
+        K to expect.
 
     Returns
     -------
-    K; `USUAL` where the pixels do not tell.
+    K; the usual one where the pixels do not tell.
     """
-    best, least = USUAL, np.inf
-    for k in _CANDIDATES:
+    best, least = usual, np.inf
+    for k in usual * _CANDIDATES:
         if k * body.max() > _MOST:
             break
         normal = np.cross(body, bounced(body, k))
         length = float(np.linalg.norm(normal))
         if length < 1e-9:
-            return USUAL
+            return usual
         # Errors beyond three deviations are something else than folds.
         left = most * np.minimum((pixels @ (normal / length) / noise) ** 2, 9.0).mean()
-        cost = float(left + np.log2(k / USUAL) ** 2)
+        cost = float(left + np.log2(k / usual) ** 2)
         if cost < least:
             best, least = float(k), cost
     return best

@@ -7,13 +7,14 @@ unit over the whole product, while a white that is 3 % off costs 0.05 (trial ren
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .dichromatic import sine
 from .errors import ReferenceColorError, WhiteError
+from .interreflection import USUAL, bounced
 from .neighborhood import mean_at, window
 from .picture import Picture, as_weights, strongest
 
@@ -32,6 +33,9 @@ _READINGS, _SAMPLE_WHITE = 6_000, 60_000
 # and how far these reach below the middle by noise alone, in standard deviations.
 _CLOSE, _AS_CLOSE, _CLOSE_DEVIATE = 0.15, 1.75, 1.33
 
+# Sine of the angle to the white under which gloss, bounce and body look alike.
+_GRAYISH = 0.1
+
 # Sine of the angle by which a pixel of the same material may leave the plane of its color and the white.
 _OFF_PLANE = 0.035
 
@@ -43,6 +47,13 @@ _SCATTER = 0.8
 # first it is within what matte pixels scatter and is left alone, from the second on all of it is taken out;
 # both are more where the window is noisy.
 _GLOSS_RAMP = (0.005, 0.008)
+
+# Bounce in a clicked pixel, as a share of its light, that is worth a look; what may be left over of it then; and light
+# of the lamps there, against that of the well lit parts, from which that tells anything.
+_FOLDED, _OFF_FOLD, _DIM = 0.02, 0.015, 0.05
+
+# Readings that lamps alone light: their light, against that of the well lit ones, and quantiles of their paleness.
+_LIT, _PALEST = 0.5, (0.85, 0.97)
 
 
 @dataclass(frozen=True)
@@ -58,11 +69,22 @@ class Reference:
     gloss
         Surface reflection that was found in the pixel and is not in `color`, as a share of the white; 0 if no pixel
         was given.
+    bounce, light
+        What was read is ``light * v + bounce * bounced(v)``, see `interreflection`, and `color` the first part of it:
+        the second is light that had met the product before.
+    palest
+        Whether v is the palest color of the material, as is right if nothing shines.
+    unfolded
+        References without bounce of which the region has to tell whether one is right, the palest first.
     """
 
     color: NDArray[np.float64]
     pixel: tuple[int, int] | None = None
     gloss: float = 0.0
+    bounce: float = 0.0
+    light: float = 1.0
+    palest: bool = False
+    unfolded: tuple[Reference, ...] = ()
 
 
 def check_pixel(picture: Picture, pixel: ArrayLike, what: str) -> tuple[int, int]:
@@ -170,7 +192,9 @@ def matte_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray |
     """
     read = reference_at(picture, pixel, white, mask)
     color = read.color / white
-    gloss = _gloss_against(color, _readings(picture, mask, read.pixel if mask is None else None) / white)
+    readings = _readings(picture, mask, read.pixel if mask is None else None) / white
+    read = replace(read, unfolded=_unfolded(read, white, readings))
+    gloss = _gloss_against(color, readings)
     if gloss <= 0:
         return read
     around = read_window(picture, check_pixel(picture, pixel, "Reference pixel"), mask) / white
@@ -178,7 +202,36 @@ def matte_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray |
     low, high = np.maximum(np.array(_GLOSS_RAMP) * color.max() / max(sine(color), 1e-3), (2 * noise, 3 * noise))
     # No body color gives back less than nothing in a channel.
     gloss = min(gloss * float(np.clip((gloss - low) / (high - low), 0, 1)), max(0.0, float(color.min())))
-    return Reference(read.color - gloss * white, read.pixel, gloss)
+    return Reference(read.color - gloss * white, read.pixel, gloss, unfolded=read.unfolded)
+
+
+def _unfolded(read: Reference, white: NDArray, readings: NDArray) -> tuple[Reference, ...]:
+    """References of which the color that was read may be the sum with its bounce, the palest first."""
+    matte = _matte_of(readings)
+    if matte is None or sine(matte) < _GRAYISH:
+        return ()
+    colors = (_palest(matte, readings), True), (matte, False)
+    return tuple(found for color, palest in colors if (found := _parted(read, white, color, palest)) is not None)
+
+
+def _parted(read: Reference, white: NDArray, matte: NDArray, palest: bool) -> Reference | None:
+    """Part a reference into the matte color of its material, as lamps alone show it, and bounce."""
+    color = read.color / white
+    terms = np.column_stack([matte, bounced(matte, USUAL)])
+    light, bounce = np.linalg.lstsq(terms, color, rcond=None)[0]
+    left, whole = float(np.linalg.norm(color - terms @ [light, bounce])), float(np.linalg.norm(color))
+    if light < _DIM or bounce * np.linalg.norm(terms[:, 1]) < _FOLDED * whole or left > _OFF_FOLD * whole:
+        return None
+    return Reference(light * matte * white, read.pixel, bounce=float(bounce), light=float(light), palest=palest)
+
+
+def _palest(matte: NDArray, readings: NDArray) -> NDArray[np.float64]:
+    """(3,) color of the palest of the well lit readings (n, 3): what lamps alone light, if nothing shines."""
+    a, b = np.linalg.pinv(np.column_stack([matte, np.ones(3)])) @ readings.T
+    lit = a > _LIT * np.quantile(a, 0.9)
+    ratio = b[lit] / a[lit]
+    low, high = np.quantile(ratio, _PALEST)
+    return np.quantile(readings[lit][(ratio >= low) & (ratio <= high)], 0.5, axis=0)
 
 
 def _readings(picture: Picture, mask: NDArray | None, near: tuple[int, int] | None = None) -> NDArray[np.float64]:
@@ -209,7 +262,7 @@ def _gloss_against(color: NDArray, pixels: NDArray) -> float:
     The pixels of one material lie in the plane of its color and the white (Shafer 1985); in units of the color, those
     without gloss have the same B / A. Below zero if the color is more matte than they are.
     """
-    if sine(color) < 0.1:
+    if sine(color) < _GRAYISH:
         return 0.0  # almost grey: gloss and body look alike
     split = np.linalg.pinv(np.column_stack([color, np.ones(3)]))
     a, b = split @ pixels.T
@@ -285,18 +338,28 @@ def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = Non
             "reference as an RGB color."
         )
     balanced = usable / white
-    light = balanced.mean(axis=1)
-    lit = light > max(DARK, 0.05 * float(np.quantile(light, 0.95)))
-    if not lit.any():
+    found = _matte_of(balanced)
+    if found is None:
         raise ReferenceColorError(
             "The product is black everywhere: use a brighter exposure, or give the reference as an RGB color."
         )
+    palest = _palest(found, balanced)
+    folded = sine(found) > _GRAYISH and _parted(Reference(found * white), white, palest, True)
+    return Reference(found * white, unfolded=(Reference(palest * white, palest=True),) if folded else ())
+
+
+def _matte_of(balanced: NDArray) -> NDArray[np.float64] | None:
+    """(3,) matte color of the main material of white-balanced readings (n, 3); None if all are black."""
+    light = balanced.mean(axis=1)
+    lit = light > max(DARK, 0.05 * float(np.quantile(light, 0.95)))
+    if not lit.any():
+        return None
     balanced, light = balanced[lit], light[lit]
     same = _main_material(balanced)
     balanced, light = balanced[same], light[same]
     low, high = np.quantile(light, (0.5, 0.9))
-    lit = np.quantile(balanced[(light >= low) & (light <= high)], 0.5, axis=0)
-    return Reference((lit - _gloss_against(lit, balanced)) * white)
+    color = np.quantile(balanced[(light >= low) & (light <= high)], 0.5, axis=0)
+    return color - _gloss_against(color, balanced)
 
 
 def _main_material(balanced: NDArray) -> NDArray[np.bool_]:

@@ -61,6 +61,9 @@ _HUGE = 1e6
 # Ranges of light for the noise.
 _BRIGHTNESS = (-np.inf, 0.004, 0.012, 0.03, 0.07, 0.15, 0.3, 0.55, 0.95, 1.6)
 
+# Quantile of the light that is that of a well lit part.
+_WELL_LIT = 0.9
+
 # Gloss (as a share of the light) and bounce (in units of the body) that count as seen.
 _GLOSS_SEEN, _BOUNCE_SEEN = 0.01, 0.03
 
@@ -122,6 +125,16 @@ class Evidence:
     figures: dict[str, float] = field(default_factory=dict)
     body_noise: float = 0.0
     other: Mixture | None = None
+
+    @property
+    def broken(self) -> float:
+        """Share of pixels that the dichromatic model does not explain."""
+        return _broken(self.figures)
+
+    @property
+    def matte(self) -> bool:
+        """Whether bounce without gloss explains the region."""
+        return self.mixture.model == "bounce" and not self.mixture.keeps_white
 
     @property
     def shines(self) -> bool:
@@ -198,13 +211,14 @@ def choose(
     relative_noise = float(noise.at(np.array(length))) / length
     figures["split_noise"] = relative_noise / max(gray, _GRAY)
     noisy = figures["split_noise"] > _NOISY
-    broken = max(figures["negative_gloss"], figures["residual"])
+    broken = _broken(figures)
     matte = glossy = False
     # Clipped highlights of the product's own color are those of metal, which gives more of the light back.
     metallic = figures["highlights"] < _FEW and seen.clipped > _FEW
-    usual = feedback = interreflection.USUAL * (2 if metallic else 1)
+    # K rho is that of the product in the light of its lamps, whatever light the reference lies in.
+    usual = feedback = interreflection.USUAL * figures["exposure"] * (2 if metallic else 1)
     if model == "bounce" or (model == "auto" and broken > (_BROKEN / 2 if noisy else _BROKEN)):
-        feedback = interreflection.find_feedback(seen.pixels, seen.body, seen.noise, seen.independent)
+        feedback = interreflection.find_feedback(seen.pixels, seen.body, seen.noise, seen.independent, usual)
         figures |= {"feedback": feedback, "matte_unexplained": _matte(seen, feedback)} | _glossy(seen, usual)
         dull = figures["highlights"] < _SHINY and seen.clipped < _FEWEST_CLIPPED
         matte = dull and figures["matte_unexplained"] < max(_FEW, broken / 3)
@@ -212,7 +226,8 @@ def choose(
         glossy = figures["glossy_unexplained"] < few and figures["bounce"] < _MOST_BOUNCE
         # What is bounced all over metal is the color of its surroundings.
         glossy &= not metallic or broken < _MOSTLY
-        glossy = bool(glossy) and _roughness(picture, seen, mask, noise, axis=0) < _TEXTURED
+        glossy = bool(glossy) and figures["split_noise"] < _LOUD
+        glossy = glossy and _roughness(picture, seen, mask, noise, axis=0) < _TEXTURED
     found: Mixture | None
     other: Mixture | None = None
     away = float(np.linalg.norm(frame(steady / white, feedback).bounce[1:]))
@@ -223,7 +238,7 @@ def choose(
     elif model == "lights" or (
         model == "auto" and broken > _LIT_OTHERWISE and _roughness(picture, seen, mask, noise, axis=1) < _ROUGH
     ):
-        found, other = _lit(seen, body, white, figures, model)
+        found, other = _lit(seen, body, white, figures, model, usual)
     else:
         found = None
     if found is None and (noisy or model == "regularized"):
@@ -235,7 +250,7 @@ def choose(
 
 
 def _lit(
-    seen: _Seen, body: NDArray, white: NDArray, figures: dict[str, float], model: str
+    seen: _Seen, body: NDArray, white: NDArray, figures: dict[str, float], model: str, usual: float
 ) -> tuple[Mixture | None, Mixture | None]:
     """A model for what gloss and bounce do not explain, None if it is not the light either; and one that may be right.
 
@@ -249,10 +264,10 @@ def _lit(
         return lit, None
     other = lit if figures["lights_unexplained"] < _LIT_OTHERWISE else None
     figures["paler"] = _paler(seen)
-    half = figures["glossy_unexplained"] < max(figures["residual"], figures["negative_gloss"]) / 2
+    half = figures["glossy_unexplained"] < _broken(figures) / 2
     fold = half and figures["paler"] < _FEW and figures["bounce"] < _MOST_BOUNCE
     if fold and figures["split_noise"] < _NOISY:
-        return mixture.mapped("bounce", body, white, interreflection.USUAL), None
+        return mixture.mapped("bounce", body, white, usual), None
     figures["off_plane"] = _off_plane(seen)
     if figures["off_plane"] < _LIT_OTHERWISE:
         return None, None
@@ -473,7 +488,18 @@ def _plain(seen: _Seen) -> dict[str, float]:
         "negative_gloss": float((gloss < -_GLOSS_SEEN - 3 * spread).mean()),
         "highlights": float(bright.mean() - lit.mean() - doubt) if len(bright) and len(lit) else 0.0,
         "least_gloss": float(np.quantile(gloss + 3 * spread, 0.02)),
+        "exposure": _exposure(seen, gloss),
     }
+
+
+def _broken(figures: dict[str, float]) -> float:
+    return max(figures.get("residual", 0.0), figures.get("negative_gloss", 0.0))
+
+
+def _exposure(seen: _Seen, gloss: NDArray) -> float:
+    """Light of the well lit matte parts, in that of the reference."""
+    matte = seen.light[gloss < _SHINY]
+    return float(np.quantile(matte, _WELL_LIT) / np.linalg.norm(seen.body)) if len(matte) else 1.0
 
 
 def _matte(seen: _Seen, feedback: float) -> float:
@@ -486,7 +512,8 @@ def _matte(seen: _Seen, feedback: float) -> float:
     off = np.array([-along[1], along[0]])
     y = seen.pixels @ axes.across.T
     # Bounce in units of the body's light, as in `split`.
-    bounce, spread = (y @ along) * axes.length / size, seen.noise * axes.length / size
+    unit = axes.length / size / axes.exposure
+    bounce, spread = (y @ along) * unit, seen.noise * unit
     wrong = np.abs(y @ off) > 3 * seen.noise
     return float((wrong | (bounce < -_BOUNCE_SEEN - 3 * spread)).mean())
 
@@ -499,7 +526,7 @@ def _glossy(seen: _Seen, feedback: float) -> dict[str, float]:
     wrong = (gloss < -_GLOSS_SEEN - 3 * seen.noise / axes.white[1]) | (left > 9)
     return {
         "glossy_unexplained": float(wrong.mean()),
-        "bounce": float(np.mean((bounce * axes.length / USUAL_BOUNCE) ** 2)),
+        "bounce": float(np.mean((bounce * axes.length / axes.exposure / USUAL_BOUNCE) ** 2)),
     }
 
 

@@ -32,13 +32,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .interreflection import bounced
+from .interreflection import USUAL, bounced
 
 # What the model itself is wrong by, as a share of a pixel's light: it counts as noise.
 MODEL_ERROR = 0.003
 
 # Widths of the priors: gloss above and below zero, as shares of the light; bounce above and below zero, in units of
-# the body's light.
+# the body's light at the usual exposure.
 _GLOSS, NO_GLOSS = 1.0, 0.02
 USUAL_BOUNCE, _NO_BOUNCE = 0.3, 0.05
 
@@ -60,6 +60,8 @@ class Frame:
         Of the body color.
     white, bounce
         (3,) the white and the bounce along these three axes.
+    exposure
+        How many times the light of the body color that is in which K is the usual one: it scales the bounce.
     """
 
     along: NDArray[np.float64]
@@ -67,6 +69,7 @@ class Frame:
     length: float
     white: tuple[float, ...]
     bounce: tuple[float, ...]
+    exposure: float = 1.0
 
 
 def frame(body: NDArray, feedback: float = 0.0) -> Frame:
@@ -81,7 +84,7 @@ def frame(body: NDArray, feedback: float = 0.0) -> Frame:
     first = toward / size
     axes = np.stack([along, first, np.cross(along, first)])
     white, bounce = ((axes @ color).tolist() for color in (np.ones(3), bounced(body, feedback)))
-    return Frame(along, axes[1:], length, tuple(white), tuple(bounce))
+    return Frame(along, axes[1:], length, tuple(white), tuple(bounce), feedback / USUAL or 1.0)
 
 
 def split(
@@ -126,7 +129,7 @@ def split(
     total = variance + (MODEL_ERROR * light) ** 2
     (e1, e2), (f1, f2) = axes.white[1:], axes.bounce[1:]
     y1, y2 = across
-    shine, folded = total / light**2, total / (light / axes.length) ** 2
+    shine, folded = total / light**2, total / (light * (axes.exposure / axes.length)) ** 2
     r1, r2 = e1 * y1 + e2 * y2, f1 * y1 + f2 * y2
     b, c = np.zeros_like(light), np.zeros_like(light)
     if gloss and bounce:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dyehouse.core.interreflection import USUAL, bounced, find_feedback
+from dyehouse.core.interreflection import USUAL, bounced, find_feedback, unbounced
 
 RHO = np.array([0.72, 0.5, 0.46])
 K = 0.6
@@ -32,6 +32,17 @@ def test_it_is_finite_and_grows_with_the_color(rho, k):
     assert np.isfinite(bounced(rho, k)).all()
     assert (bounced(rho, k) >= 0).all()
     assert (bounced(np.maximum(rho, 0) * 1.1, k) >= bounced(rho, k)).all()
+
+
+@given(arrays(np.float64, 3, elements=st.floats(0, 1.5)), st.floats(0.05, 2), st.floats(0, 5))
+def test_what_was_read_with_its_bounce_is_parted_from_it(rho, light, bounce):
+    read = light * rho + bounce * bounced(rho, USUAL)
+    np.testing.assert_allclose(unbounced(read, bounce, light), light * rho, rtol=1e-9, atol=1e-12)
+
+
+@given(arrays(np.float64, 3, elements=st.floats(-1, 1e6)), st.floats(0.05, 2), st.floats(0, 1e3))
+def test_parting_any_color_is_finite(color, light, bounce):
+    assert np.isfinite(unbounced(color, bounce, light)).all()
 
 
 @pytest.mark.parametrize("exposure", [1.0, 0.4])

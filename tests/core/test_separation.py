@@ -54,7 +54,11 @@ def test_it_is_the_minimum_of_the_sum_it_says():
             left = across - np.array(axes.white[1:]) * x[0] - np.array(axes.bounce[1:]) * x[1]
             wide_b = 1.0 if x[0] >= 0 else NO_GLOSS
             wide_c = 0.3 if x[1] >= 0 else 0.05
-            return (left**2).sum() / total + (x[0] / light / wide_b) ** 2 + (x[1] / (light / axes.length) / wide_c) ** 2
+            return (
+                (left**2).sum() / total
+                + (x[0] / light / wide_b) ** 2
+                + (x[1] / (light * axes.exposure / axes.length) / wide_c) ** 2
+            )
 
         options = {"xatol": 1e-9, "fatol": 1e-12, "maxiter": 4000}
         starts = ([0.0, 0.0], [0.05, 0.05], [-0.05, 0.2])

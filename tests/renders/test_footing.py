@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dyehouse.benchmarks import speed_accuracy
 from dyehouse.benchmarks.calibration import clicks, footings, guesses
+from dyehouse.benchmarks.ladder import PALE
 from dyehouse.benchmarks.speed_accuracy import pairs
 from dyehouse.core import analyze
 from dyehouse.core.reference import SURE_WHITE
@@ -32,6 +34,13 @@ def test_the_same_on_other_products(scene):
     assert np.mean([c.median for c in found]) < 0.7
 
 
+def clicked(pair, x, y):
+    """Analysis of a click, and the median error of a recolor to what a true sample shows there."""
+    analysis = analyze(pair.photo, pair.white, (x, y), pair.view.mask)
+    there = replace(pair, view=replace(pair.view, reference=(x, y)))
+    return analysis, float(np.median(pair.errors(analysis.recolor(analysis.matte_target(there.color(pair.truth))))))
+
+
 def matte_clicks(pair, count=12):
     """Pixels all over the matte, lit part of the product, each with the true color there."""
     terms = np.linalg.pinv(np.column_stack([pair.color(pair.photo), pair.white]))
@@ -46,10 +55,37 @@ def test_a_reference_anywhere_on_the_matte_area_gives_the_same(scene, bar):
     pair = next(iter(pairs(scene, FAST, COLORS)))
     medians = []
     for x, y in matte_clicks(pair):
-        there = replace(pair, view=replace(pair.view, reference=(x, y)))
-        analysis = analyze(pair.photo, pair.white, (x, y), pair.view.mask)
-        medians.append(np.median(pair.errors(analysis.recolor(analysis.matte_target(there.color(pair.truth))))))
+        medians.append(clicked(pair, x, y)[1])
     assert np.ptp(np.quantile(medians, (0.1, 0.9))) <= bar
+
+
+@pytest.mark.parametrize("color", ["pink", "beige", "red", "yellow"])
+def test_a_click_in_light_that_the_product_throws_on_itself(color):
+    colors = {"blue": COLORS["blue"], color: {**PALE, **speed_accuracy.COLORS}[color]}
+    pair = next(p for p in pairs("folds", FAST, colors) if p.source == color)
+    light = pair.photo.mean(axis=2)
+    rows, columns = np.nonzero(pair.view.interior & (light > 0.5 * np.quantile(light[pair.view.interior], 0.9)))
+    chosen = np.random.default_rng(0).choice(len(rows), 12, replace=False)
+    found = [clicked(pair, int(columns[k]), int(rows[k])) for k in chosen]
+    errors = [error for _, error in found]
+    assert np.median(errors) < 0.6
+    assert max(errors) < 2
+    folded = [analysis for analysis, _ in found if analysis.bounce > 0.15]
+    assert folded
+    assert all(any("throws on itself" in s for s in analysis.warnings) for analysis in folded)
+
+
+@pytest.mark.parametrize("scene", ["folds", "mug"])
+def test_the_light_that_a_reference_lies_in_does_not_matter(scene):
+    colors = {"blue": COLORS["blue"], "pink": PALE["pink"]}
+    pair = next(p for p in pairs(scene, FAST, colors) if p.source == "pink")
+    body, target = pair.color(pair.photo), pair.color(pair.truth)
+    results = []
+    for light in (1, 0.25):
+        analysis = analyze(pair.photo, pair.white, light * body, pair.view.mask)
+        assert analysis.model == "bounce"
+        results.append(np.median(pair.errors(analysis.recolor(light * target))))
+    assert abs(results[0] - results[1]) < 0.05
 
 
 @pytest.mark.parametrize("channel", [0, 2])
