@@ -22,10 +22,14 @@ from .materials import find_materials
 from .mixture import MODELS as _MODELS
 from .mixture import Mixture
 from .picture import Picture, as_mask, as_weights, bounding_box, coverage
-from .reference import DARK, Reference, matte_at, matte_reference
+from .reference import DARK, Reference, matte_at, matte_reference, stray, unfolded
 from .selection import Evidence, choose, noise_across
 
 MODELS = ("auto", *_MODELS)
+
+# Color difference of a click from most of its region, lightness apart, from which it is in doubt; and share of a region
+# that is not explained from which it is the region's own color that is in doubt.
+_STRAY, _OWN = 1.6, 0.04
 
 # Noise gain above which the product counts as nearly grey.
 LARGEST_NOISE_GAIN = 6.0
@@ -44,10 +48,10 @@ _GLOSSY = 0.03
 _BOUNCED = 0.05
 _SAMPLE = 200_000
 
-# Share of a region that gloss and shading do not explain from which its palest color may be that of the lamps' light
-# alone; mean square of the bounce, against the usual one, that folds have at least; and the share of what was not
-# explained that another reference may leave.
-_SHOWN_BY_FOLDS, _DEEP, _MUCH_LESS = 0.06, 0.4, 0.6
+# Share of a region that gloss and shading do not explain from which it may lie in folds, and from which its palest
+# color may be that of the lamps alone; mean square of the bounce, against the usual one, that folds have at least; and
+# the part of what was not explained that another reference may leave.
+_FOLDS, _PALE_FOLDS, _DEEP, _MUCH_LESS = 0.015, 0.06, 0.4, 0.6
 
 # Pixels that the predicted error is found at: for its map, and for the region; and those in one go.
 _MAPPED, _LOOKED_AT, _AT_ONCE = 1_000_000, 1_000, 10_000
@@ -86,6 +90,9 @@ class Analysis:
     bounce
         Light that had met the product before, which was found in the reference pixel and left out too: a multiple of
         :func:`interreflection.bounced` of what `light` times is `reference`.
+    stray
+        CIEDE2000, lightness apart, between the color that was clicked and that of most of the product; 0 where the
+        region speaks for the click.
     spill
         Whether what shows of the product outside the selection is recolored too: its rim where the selection is too
         tight, and the light that it throws on a neutral surround.
@@ -102,6 +109,7 @@ class Analysis:
     gloss: float = 0.0
     bounce: float = 0.0
     light: float = 1.0
+    stray: float = 0.0
     spill: bool = False
 
     def matte_target(self, color: ArrayLike, target_white: ArrayLike | None = None) -> NDArray[np.float64]:
@@ -287,7 +295,8 @@ class Analysis:
             As for :meth:`matrix`.
         """
         prediction = self.doubt(target, target_white).predict(self._sample)
-        return replace(prediction, warnings=(*prediction.warnings, *self.warnings))
+        flagged = prediction.flagged or self.stray > _STRAY
+        return replace(prediction, flagged=flagged, warnings=(*prediction.warnings, *self.warnings))
 
     def doubt(self, target: ArrayLike, target_white: ArrayLike | None = None) -> confidence.Doubt:
         """What the prediction for one target is made from."""
@@ -423,8 +432,10 @@ def analyze(
         )
     found, evidence = _look(picture, found, w, m, model)
     gain = stability.noise_gain(found.color, w)
+    apart = stray(found, w, evidence.matte) if m is not None and found.pixel and evidence.broken < _OWN else 0.0
     warnings = (
         reference_warnings(found, w, model)
+        + _stray_warnings(apart)
         + _evidence_warnings(evidence)
         + _region_warnings(picture, m)
         + _material_warnings(picture, w, m)
@@ -445,6 +456,7 @@ def analyze(
         found.gloss,
         found.bounce,
         found.light,
+        apart,
         spill,
     )
     made.__dict__["_sides"] = sides  # until the outline is found
@@ -458,15 +470,15 @@ def _look(
     evidence = choose(picture, found.color, white, mask, found.pixel, model)
     if model not in ("auto", "bounce"):
         return found, evidence
-    for other in found.unfolded:
-        if other.palest and evidence.broken < _SHOWN_BY_FOLDS:
+    for other in unfolded(found, white) if evidence.broken > _FOLDS else ():
+        if other.palest and evidence.broken < _PALE_FOLDS:
             continue
         folds = choose(picture, other.color, white, mask, found.pixel, model)
         if _fits_better(folds, evidence, other.palest):
             return other, folds
     if found.gloss > 0 and evidence.mixture.model != "dichromatic":
         # Folds are more saturated than a matte ridge, which makes it look glossy beside them.
-        read = Reference(found.color + found.gloss * white, found.pixel)
+        read = replace(found, color=found.color + found.gloss * white, gloss=0.0)
         folds = choose(picture, read.color, white, mask, read.pixel, model)
         if folds.matte:
             return read, folds
@@ -575,6 +587,15 @@ def _material_warnings(picture: Picture, white: NDArray, mask: NDArray | None) -
     return [
         f"The region holds {len(found)} materials ({parts}) and is recolored as one: make each a region of its own, "
         "selected by a click there."
+    ]
+
+
+def _stray_warnings(apart: float) -> list[str]:
+    if apart < _STRAY:
+        return []
+    return [
+        f"The reference pixel has another color than most of the region ({apart:.1f} CIEDE2000): click where the "
+        "product has its own color, or select what has that of the pixel."
     ]
 
 

@@ -7,11 +7,13 @@ unit over the whole product, while a white that is 3 % off costs 0.05 (trial ren
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .colorimetry import delta_e_2000, linear_to_lab
+from .colorspace import LINEAR_SRGB
 from .dichromatic import sine
 from .errors import ReferenceColorError, WhiteError
 from .interreflection import USUAL, bounced
@@ -56,7 +58,11 @@ _FOLDED, _OFF_FOLD, _DIM = 0.02, 0.015, 0.05
 _LIT, _PALEST = 0.5, (0.85, 0.97)
 
 
-@dataclass(frozen=True)
+# Mean of the channels at which colors are compared lightness apart.
+_MIDDLE = 0.3
+
+
+@dataclass(frozen=True, eq=False)
 class Reference:
     """A reference color and what was seen when it was taken.
 
@@ -74,8 +80,8 @@ class Reference:
         the second is light that had met the product before.
     palest
         Whether v is the palest color of the material, as is right if nothing shines.
-    unfolded
-        References without bounce of which the region has to tell whether one is right, the palest first.
+    readings
+        (n, 3) colors of the product that it was held against, relative to the white; None if it was given as a color.
     """
 
     color: NDArray[np.float64]
@@ -84,7 +90,7 @@ class Reference:
     bounce: float = 0.0
     light: float = 1.0
     palest: bool = False
-    unfolded: tuple[Reference, ...] = ()
+    readings: NDArray[np.float64] | None = field(default=None, repr=False)
 
 
 def check_pixel(picture: Picture, pixel: ArrayLike, what: str) -> tuple[int, int]:
@@ -193,7 +199,7 @@ def matte_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray |
     read = reference_at(picture, pixel, white, mask)
     color = read.color / white
     readings = _readings(picture, mask, read.pixel if mask is None else None) / white
-    read = replace(read, unfolded=_unfolded(read, white, readings))
+    read = replace(read, readings=readings)
     gloss = _gloss_against(color, readings)
     if gloss <= 0:
         return read
@@ -202,16 +208,59 @@ def matte_at(picture: Picture, pixel: ArrayLike, white: NDArray, mask: NDArray |
     low, high = np.maximum(np.array(_GLOSS_RAMP) * color.max() / max(sine(color), 1e-3), (2 * noise, 3 * noise))
     # No body color gives back less than nothing in a channel.
     gloss = min(gloss * float(np.clip((gloss - low) / (high - low), 0, 1)), max(0.0, float(color.min())))
-    return Reference(read.color - gloss * white, read.pixel, gloss, unfolded=read.unfolded)
+    return replace(read, color=read.color - gloss * white, gloss=gloss)
 
 
-def _unfolded(read: Reference, white: NDArray, readings: NDArray) -> tuple[Reference, ...]:
-    """References of which the color that was read may be the sum with its bounce, the palest first."""
-    matte = _matte_of(readings)
-    if matte is None or sine(matte) < _GRAYISH:
+def unfolded(found: Reference, white: NDArray) -> tuple[Reference, ...]:
+    """Part a reference from light that had met the product before.
+
+    Parameters
+    ----------
+    found
+        A reference that was clicked or found.
+    white
+        (3,) white of the light.
+
+    Returns
+    -------
+    References without bounce, the palest first, of which the region has to tell whether one is right.
+    """
+    matte = _matte_of(found.readings) if found.readings is not None else None
+    if found.readings is None or matte is None or sine(matte) < _GRAYISH:
         return ()
-    colors = (_palest(matte, readings), True), (matte, False)
-    return tuple(found for color, palest in colors if (found := _parted(read, white, color, palest)) is not None)
+    read = replace(found, color=found.color + found.gloss * white, gloss=0.0)
+    palest = _palest(matte, found.readings)
+    parted = _parted(read, white, palest, True), _parted(read, white, matte, False)
+    if found.pixel is None and parted[0] is not None:
+        # In the light of the lamps, as there is no click to say which.
+        return (replace(read, color=palest * white, palest=True),)
+    return tuple(other for other in parted if other is not None)
+
+
+def stray(found: Reference, white: NDArray, matte: bool) -> float:
+    """Color difference of a reference from most of its product, lightness apart.
+
+    Parameters
+    ----------
+    found
+        A reference that was clicked.
+    white
+        (3,) white of the light.
+    matte
+        Whether nothing shines, so that the palest color is the product's.
+
+    Returns
+    -------
+    CIEDE2000; 0 if there is nothing to hold it against.
+    """
+    main = _matte_of(found.readings) if found.readings is not None else None
+    if found.readings is None or main is None:
+        return 0.0
+    if matte:
+        main = _palest(main, found.readings)
+    both = np.stack([found.color / white, main])
+    lab = linear_to_lab(_MIDDLE * both / np.maximum(both.mean(axis=1, keepdims=True), 1e-6), LINEAR_SRGB)
+    return float(delta_e_2000(lab[0], lab[1]))
 
 
 def _parted(read: Reference, white: NDArray, matte: NDArray, palest: bool) -> Reference | None:
@@ -222,7 +271,7 @@ def _parted(read: Reference, white: NDArray, matte: NDArray, palest: bool) -> Re
     left, whole = float(np.linalg.norm(color - terms @ [light, bounce])), float(np.linalg.norm(color))
     if light < _DIM or bounce * np.linalg.norm(terms[:, 1]) < _FOLDED * whole or left > _OFF_FOLD * whole:
         return None
-    return Reference(light * matte * white, read.pixel, bounce=float(bounce), light=float(light), palest=palest)
+    return replace(read, color=light * matte * white, bounce=float(bounce), light=float(light), palest=palest)
 
 
 def _palest(matte: NDArray, readings: NDArray) -> NDArray[np.float64]:
@@ -337,15 +386,13 @@ def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = Non
             "Every pixel of the product is clipped, so its color is lost: use a darker exposure, or give the "
             "reference as an RGB color."
         )
-    balanced = usable / white
-    found = _matte_of(balanced)
+    readings = usable / white
+    found = _matte_of(readings)
     if found is None:
         raise ReferenceColorError(
             "The product is black everywhere: use a brighter exposure, or give the reference as an RGB color."
         )
-    palest = _palest(found, balanced)
-    folded = sine(found) > _GRAYISH and _parted(Reference(found * white), white, palest, True)
-    return Reference(found * white, unfolded=(Reference(palest * white, palest=True),) if folded else ())
+    return Reference(found * white, readings=readings)
 
 
 def _matte_of(balanced: NDArray) -> NDArray[np.float64] | None:

@@ -108,6 +108,19 @@ def test_a_matte_click_is_taken_as_it_is_read(product):
     np.testing.assert_array_equal(found.color, read.color)
 
 
+def test_a_click_on_another_color_than_most_of_the_product_is_seen():
+    rng = np.random.default_rng(0)
+    body, label = np.array([0.5, 0.2, 0.15]), np.array([0.5, 0.16, 0.09])
+    image = rng.uniform(0.5, 1, (80, 80, 1)) * body
+    image[10:20, 10:70] = rng.uniform(0.5, 1, (10, 60, 1)) * label
+    mask = np.ones((80, 80))
+    clicks = [r.matte_at(Picture(image.astype(np.float32)), at, np.ones(3), mask) for at in ((40, 60), (40, 15))]
+    own, other = (r.stray(click, np.ones(3), matte=False) for click in clicks)
+    assert own < 0.5
+    assert other > 3
+    assert r.stray(r.Reference(body), np.ones(3), matte=False) == 0  # a color that was not clicked
+
+
 def test_gloss_under_a_click_does_not_depend_on_exposure(product):
     scene = product(size=128)
     y, x = np.unravel_index(np.argmin(np.where(scene.mask == 1, np.abs(scene.gloss - 0.01), 9)), scene.mask.shape)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from dyehouse.benchmarks.calibration import BAD, CAMERAS, GOOD, cases, rank_correlation, scores
+from dyehouse.benchmarks.calibration import BAD, CAMERAS, GOOD, anywhere, cases, rank_correlation, scores
 from dyehouse.benchmarks.camera import Camera
+from dyehouse.benchmarks.ladder import PALE
 from dyehouse.benchmarks.speed_accuracy import FAILURES, WELL_BEHAVED, pairs
 from dyehouse.core import analyze
 
@@ -47,6 +48,16 @@ def test_what_is_bad_is_flagged_and_what_is_good_is_not(found):
 def test_within_a_picture_the_worse_pixels_are_predicted_worse(found):
     ranks = [rank_correlation(case.predicted(), case.errors) for case in found]
     assert np.median(ranks) > 0.1
+
+
+def test_clicks_anywhere_are_flagged_where_they_go_wrong_and_hardly_elsewhere():
+    colors = {"blue": COLORS["blue"], "pink": PALE["pink"]}
+    clicked = [c for scene in ("mug", "folds", "translucent_mug") for c in anywhere(scene, FAST, colors)]
+    good, bad = [c.flagged for c in clicked if c.median < GOOD], [c.flagged for c in clicked if c.median > BAD]
+    assert np.median([c.median for c in clicked]) < 1
+    assert len(good) > 40
+    assert np.mean(good) <= 0.05
+    assert np.mean(bad) > 2 * np.mean(good)
 
 
 def told(scene, source):
