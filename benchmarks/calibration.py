@@ -681,7 +681,7 @@ def main() -> None:
             {confidence.PIXEL_BOUND:.1f} times its predicted error, that of a region {confidence.REGION_BOUND:.1f} times
             its 90th percentile. Flagged is what is predicted to have a median over {confidence.FLAG:g}, or hangs on
             the choice of the model for metal or two lights, or departs from the plain model in a way that noise
-            hides."""
+            hides, or was clicked on another color than most of its region."""
         ),
         *_predictions(found),
         "",

@@ -27,10 +27,6 @@ from .selection import Evidence, choose, noise_across
 
 MODELS = ("auto", *_MODELS)
 
-# Color difference of a click from most of its region, lightness apart, from which it is in doubt; and share of a region
-# that is not explained from which it is the region's own color that is in doubt.
-_STRAY, _OWN = 1.6, 0.04
-
 # Noise gain above which the product counts as nearly grey.
 LARGEST_NOISE_GAIN = 6.0
 
@@ -91,8 +87,8 @@ class Analysis:
         Light that had met the product before, which was found in the reference pixel and left out too: a multiple of
         :func:`interreflection.bounced` of what `light` times is `reference`.
     stray
-        CIEDE2000, lightness apart, between the color that was clicked and that of most of the product; 0 where the
-        region speaks for the click.
+        CIEDE2000, lightness apart, between the color that was clicked and that of most of the product; 0 for an
+        ordinary click.
     spill
         Whether what shows of the product outside the selection is recolored too: its rim where the selection is too
         tight, and the light that it throws on a neutral surround.
@@ -295,7 +291,7 @@ class Analysis:
             As for :meth:`matrix`.
         """
         prediction = self.doubt(target, target_white).predict(self._sample)
-        flagged = prediction.flagged or self.stray > _STRAY
+        flagged = prediction.flagged or self.stray > 0
         return replace(prediction, flagged=flagged, warnings=(*prediction.warnings, *self.warnings))
 
     def doubt(self, target: ArrayLike, target_white: ArrayLike | None = None) -> confidence.Doubt:
@@ -432,7 +428,7 @@ def analyze(
         )
     found, evidence = _look(picture, found, w, m, model)
     gain = stability.noise_gain(found.color, w)
-    apart = stray(found, w, evidence.matte) if m is not None and found.pixel and evidence.broken < _OWN else 0.0
+    apart = stray(found, w, evidence.matte) if m is not None and found.pixel else 0.0
     warnings = (
         reference_warnings(found, w, model)
         + _stray_warnings(apart)
@@ -591,7 +587,7 @@ def _material_warnings(picture: Picture, white: NDArray, mask: NDArray | None) -
 
 
 def _stray_warnings(apart: float) -> list[str]:
-    if apart < _STRAY:
+    if apart == 0:
         return []
     return [
         f"The reference pixel has another color than most of the region ({apart:.1f} CIEDE2000): click where the "

@@ -29,7 +29,7 @@ SURE_WHITE = 0.75
 _CHANCES = (0.0, 0.65, 0.75, 1.0), (0.35, 0.45, 0.8, 0.95)
 
 # Pixels that a search looks at; more do not change the answer. The white is found from few of them.
-_READINGS, _SAMPLE_WHITE = 6_000, 60_000
+_READINGS, _SAMPLE_WHITE = 4_000, 60_000
 
 # The matte readings of a material are the lowest share of them that lie closer together than so many times the closest;
 # and how far these reach below the middle by noise alone, in standard deviations.
@@ -58,8 +58,10 @@ _FOLDED, _OFF_FOLD, _DIM = 0.02, 0.015, 0.05
 _LIT, _PALEST = 0.5, (0.85, 0.97)
 
 
-# Mean of the channels at which colors are compared lightness apart.
-_MIDDLE = 0.3
+# Color difference of a click from the main color of its product from which it may be another, and share of readings as
+# far away under which it is; mean of the channels at which they are compared, light against that of well lit ones from
+# which they count, and how many readings apart are enough for that.
+_STRAY, _RARE, _MIDDLE, _SHADE, _FEW_READINGS = 1.2, 0.1, 0.3, 0.2, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +240,7 @@ def unfolded(found: Reference, white: NDArray) -> tuple[Reference, ...]:
 
 
 def stray(found: Reference, white: NDArray, matte: bool) -> float:
-    """Color difference of a reference from most of its product, lightness apart.
+    """Color difference of a click from most of its product, lightness apart, if few of its readings are as far from it.
 
     Parameters
     ----------
@@ -251,16 +253,20 @@ def stray(found: Reference, white: NDArray, matte: bool) -> float:
 
     Returns
     -------
-    CIEDE2000; 0 if there is nothing to hold it against.
+    CIEDE2000; 0 where the click is an ordinary one, or there is nothing to hold it against.
     """
-    main = _matte_of(found.readings) if found.readings is not None else None
-    if found.readings is None or main is None:
+    readings = found.readings[::_FEW_READINGS] if found.readings is not None else np.empty((0, 3))
+    main = _matte_of(readings) if len(readings) else None
+    if main is None:
         return 0.0
     if matte:
-        main = _palest(main, found.readings)
-    both = np.stack([found.color / white, main])
-    lab = linear_to_lab(_MIDDLE * both / np.maximum(both.mean(axis=1, keepdims=True), 1e-6), LINEAR_SRGB)
-    return float(delta_e_2000(lab[0], lab[1]))
+        main = _palest(main, readings)
+    light = readings.mean(axis=1)
+    lit = readings[light > _SHADE * np.quantile(light, 0.9)]
+    colors = np.vstack([main, found.color / white, lit])
+    lab = linear_to_lab(_MIDDLE * colors / np.maximum(colors.mean(axis=1, keepdims=True), 1e-6), LINEAR_SRGB)
+    away, *others = delta_e_2000(lab[1:], lab[0])
+    return float(away) if away > _STRAY and np.mean(np.array(others) >= away) < _RARE else 0.0
 
 
 def _parted(read: Reference, white: NDArray, matte: NDArray, palest: bool) -> Reference | None:
@@ -296,7 +302,7 @@ def _readings(picture: Picture, mask: NDArray | None, near: tuple[int, int] | No
         right, bottom = width, height
     else:
         reach = max(8, round(0.12 * max(height, width)))
-        step = max(1, reach // 25)
+        step = max(1, reach // 18)
         (left, right), (top, bottom) = ((max(0, k - reach), k + reach) for k in near)
     rows, columns = np.nonzero(wanted[top:bottom:step, left:right:step])
     rows, columns = top + step * rows, left + step * columns
