@@ -590,9 +590,9 @@ def _flags(found: Sequence[Anywhere]) -> str:
     return " | ".join(f"{sum(c.flagged for c in those)} of {len(those)}" for those in (bad, good))
 
 
-def _footing_table(scenes: Sequence[str], settings: Settings) -> list[str]:
+def _footing_table(scenes: Sequence[str], settings: Settings, colors: Mapping[str, RGB] = COLORS) -> list[str]:
     lines = ["| scene | true footing | reference found | white found too | asks |", "|---|---|---|---|---|"]
-    every = list(footings(scenes, settings))
+    every = [f for f in footings(scenes, settings, colors) if colors is COLORS or f.source in PALE]
     for scene in dict.fromkeys(f.scene for f in every):
         chosen = [f for f in every if f.scene == scene]
         figures = np.mean([[f.true, f.reference, f.both] for f in chosen], axis=0)
@@ -719,6 +719,10 @@ def main() -> None:
             less than {SURE_WHITE:.0%} sure of the white, or refuses to look for one."""
         ),
         *_footing_table(scenes, settings),
+        "",
+        "The same in pink, beige and white:",
+        "",
+        *_footing_table(ANYWHERE, settings, {"blue": COLORS["blue"], **PALE}),
         "",
         "Whites from highlights, of eight scenes in four colors under five lights, as float and through a camera:",
         "",

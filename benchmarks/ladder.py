@@ -254,7 +254,8 @@ _FAILS = (
     "far over the bar. Through an 8-bit camera the metal may be taken for a product in two lights. It is flagged.",
     "**Gold in gray surroundings.** Clipped in two channels, and lit by itself many times over.",
     "**Pale products between two lights.** Lamp light on a pale product looks like gloss. Without a wide gap between "
-    "body color and white the second light is not found.",
+    "body color and white the second light is not found (up to 30 off); what a second light would explain as well is "
+    "flagged, through a camera not always.",
     "**Pale mug through an 8-bit camera.** Gloss and bounce move a pale color in almost opposite directions. Where "
     "noise could have made both, neither is believed: that keeps blotches away, and loses the faint gloss and bounce "
     "of the true picture, and the rim of small highlights. The true color at the reference would make it little better "

@@ -271,14 +271,14 @@ class Doubt:
             "grain": differences[10],
             "lights": np.zeros(len(result), np.float32),
         }
-        if grounds.mixture.model == "lights" or grounds.other is not None:
+        if grounds.mixture.model == "lights" or (grounds.other is not None and grounds.mixture.model != "bounce"):
             found["lights"] = self._disagreement(seen)
         return found
 
     def _disagreement(self, seen: Sample) -> NDArray[np.float32]:
         """(n,) CIEDE2000 between the model and the other, or the plain one; 0 where the plain one is of no use."""
         grounds, mixture = self.grounds, self.grounds.mixture
-        if not grounds.splits:
+        if grounds.other is None and not grounds.splits:
             return np.zeros(len(seen.given), np.float32)
         if grounds.other is None:
             other = dichromatic.recolor_matrix(mixture.body, self.target, mixture.white, self.target_white)
@@ -294,7 +294,8 @@ class Doubt:
         median, most = (float(error) for error in np.quantile(errors, (0.5, 0.9)))
         bound = REGION_BOUND * most
         model = self.grounds.mixture.model
-        overruled = model in ("metal", "lights") and float(np.median(self._disagreement(seen))) > FLAG_MODEL
+        rivaled = model in ("metal", "lights") or (model == "bounce" and self.grounds.other is not None)
+        overruled = rivaled and float(np.median(self._disagreement(seen))) > FLAG_MODEL
         said = []
         if median > FLAG:
             worst = max(parts, key=lambda name: WEIGHTS[name] * float(np.median(parts[name])))
@@ -304,9 +305,10 @@ class Doubt:
             )
         elif overruled:
             what = "metal" if model == "metal" else "lit by two lights"
+            other = "lights" if model == "bounce" else "dichromatic"
             said.append(
-                f"The result depends on whether the product is really {what}: compare the model 'dichromatic', or "
-                "check a sample."
+                f"The result depends on whether the product is really {what}: compare the model '{other}', or check a "
+                "sample."
             )
         elif self.grounds.hidden:
             said.append(

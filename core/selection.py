@@ -240,6 +240,8 @@ def choose(
         found = mixture.matte_bounce(body, white, feedback)
     elif matte or glossy or model == "bounce":
         found = mixture.mapped("bounce", steady, white, feedback if matte else usual, gloss=not matte)
+        if glossy and figures["residual"] > _OTHER_LIGHT[1]:
+            other = _second_light(seen, body, white, figures)
     elif model == "lights" or (
         model == "auto" and broken > _LIT_OTHERWISE and _roughness(picture, seen, mask, noise, axis=1) < _ROUGH
     ):
@@ -254,6 +256,12 @@ def choose(
     return Evidence(found, noise, below, figures, body_noise, other)
 
 
+def _second_light(seen: _Seen, body: NDArray, white: NDArray, figures: dict[str, float]) -> Mixture | None:
+    """Two lights, if they explain the region."""
+    light, figures["lights_unexplained"] = _lights(seen)
+    return mixture.two_lights(body, white, light) if figures["lights_unexplained"] < _LIT_OTHERWISE else None
+
+
 def _lit(
     seen: _Seen, body: NDArray, white: NDArray, figures: dict[str, float], model: str, usual: float
 ) -> tuple[Mixture | None, Mixture | None]:
@@ -263,11 +271,9 @@ def _lit(
     gain by channel is right for any light, and for metal. But where bounce explains half of it and no pixel is paler
     than the body color, it is a fold.
     """
-    light, figures["lights_unexplained"] = _lights(seen)
-    lit = mixture.two_lights(body, white, light)
     if model == "lights":
-        return lit, None
-    other = lit if figures["lights_unexplained"] < _LIT_OTHERWISE else None
+        return mixture.two_lights(body, white, _lights(seen)[0]), None
+    other = _second_light(seen, body, white, figures)
     figures["paler"] = _paler(seen)
     half = figures["glossy_unexplained"] < _broken(figures) / 2
     fold = half and figures["paler"] < _FEW and figures["bounce"] < _MOST_BOUNCE

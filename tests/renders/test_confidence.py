@@ -60,6 +60,15 @@ def test_clicks_anywhere_are_flagged_where_they_go_wrong_and_hardly_elsewhere():
     assert np.mean(bad) > 2 * np.mean(good)
 
 
+def test_a_pale_product_between_two_lights_is_flagged():
+    colors = {"blue": COLORS["blue"], "pink": PALE["pink"]}
+    pair = next(p for p in pairs("two_lights", FAST, colors) if p.source == "pink")
+    analysis = analyze(pair.photo, pair.white, pair.view.reference, pair.view.mask)
+    target = analysis.matte_target(pair.color(pair.truth))
+    assert np.median(pair.errors(analysis.recolor(target))) > BAD
+    assert analysis.predicted(target).flagged
+
+
 def told(scene, source):
     [pair] = [p for p in pairs(scene, FAST, COLORS) if p.source == source]
     analysis = analyze(pair.photo, pair.white, pair.view.reference, pair.view.mask)
