@@ -57,7 +57,6 @@ _FOLDED, _OFF_FOLD, _DIM = 0.02, 0.015, 0.05
 # Readings that lamps alone light: their light, against that of the well lit ones, and quantiles of their paleness.
 _LIT, _PALEST = 0.5, (0.85, 0.97)
 
-
 # Color difference of a click from the main color of its product from which it may be another, and share of readings as
 # far away under which it is; mean of the channels at which they are compared, light against that of well lit ones from
 # which they count, and how many readings apart are enough for that.
@@ -227,11 +226,12 @@ def unfolded(found: Reference, white: NDArray) -> tuple[Reference, ...]:
     -------
     References without bounce, the palest first, of which the region has to tell whether one is right.
     """
-    matte = _matte_of(found.readings) if found.readings is not None else None
-    if found.readings is None or matte is None or sine(matte) < _GRAYISH:
+    readings = _held_against(found)
+    matte = _matte_of(readings)
+    if matte is None or sine(matte) < _GRAYISH:
         return ()
     read = replace(found, color=found.color + found.gloss * white, gloss=0.0)
-    palest = _palest(matte, found.readings)
+    palest = _palest(matte, readings)
     parted = _parted(read, white, palest, True), _parted(read, white, matte, False)
     if found.pixel is None and parted[0] is not None:
         # In the light of the lamps, as there is no click to say which.
@@ -255,8 +255,8 @@ def stray(found: Reference, white: NDArray, matte: bool) -> float:
     -------
     CIEDE2000; 0 where the click is an ordinary one, or there is nothing to hold it against.
     """
-    readings = found.readings[::_FEW_READINGS] if found.readings is not None else np.empty((0, 3))
-    main = _matte_of(readings) if len(readings) else None
+    readings = _held_against(found)[::_FEW_READINGS]
+    main = _matte_of(readings)
     if main is None:
         return 0.0
     if matte:
@@ -267,6 +267,10 @@ def stray(found: Reference, white: NDArray, matte: bool) -> float:
     lab = linear_to_lab(_MIDDLE * colors / np.maximum(colors.mean(axis=1, keepdims=True), 1e-6), LINEAR_SRGB)
     away, *others = delta_e_2000(lab[1:], lab[0])
     return float(away) if away > _STRAY and np.mean(np.array(others) >= away) < _RARE else 0.0
+
+
+def _held_against(found: Reference) -> NDArray[np.float64]:
+    return np.empty((0, 3)) if found.readings is None else found.readings
 
 
 def _parted(read: Reference, white: NDArray, matte: NDArray, palest: bool) -> Reference | None:
@@ -283,10 +287,14 @@ def _parted(read: Reference, white: NDArray, matte: NDArray, palest: bool) -> Re
 def _palest(matte: NDArray, readings: NDArray) -> NDArray[np.float64]:
     """(3,) color of the palest of the well lit readings (n, 3): what lamps alone light, if nothing shines."""
     a, b = np.linalg.pinv(np.column_stack([matte, np.ones(3)])) @ readings.T
-    lit = a > _LIT * np.quantile(a, 0.9)
-    ratio = b[lit] / a[lit]
-    low, high = np.quantile(ratio, _PALEST)
-    return np.quantile(readings[lit][(ratio >= low) & (ratio <= high)], 0.5, axis=0)
+    lit = (a > 0) & (a >= _LIT * np.quantile(a, 0.9))
+    return _median_between(readings[lit], b[lit] / a[lit], *_PALEST) if lit.any() else matte
+
+
+def _median_between(readings: NDArray, by: NDArray, low: float, high: float) -> NDArray[np.float64]:
+    """(3,) median of those readings (n, 3) that lie between two quantiles in the order of some numbers (n,)."""
+    first, last = (int(share * len(by)) for share in (low, high))
+    return np.quantile(readings[np.argsort(by)[first : max(last, first + 1)]], 0.5, axis=0)
 
 
 def _readings(picture: Picture, mask: NDArray | None, near: tuple[int, int] | None = None) -> NDArray[np.float64]:
@@ -402,7 +410,9 @@ def matte_reference(picture: Picture, white: NDArray, mask: NDArray | None = Non
 
 
 def _matte_of(balanced: NDArray) -> NDArray[np.float64] | None:
-    """(3,) matte color of the main material of white-balanced readings (n, 3); None if all are black."""
+    """(3,) matte color of the main material of white-balanced readings (n, 3); None without any that are not black."""
+    if len(balanced) == 0:
+        return None
     light = balanced.mean(axis=1)
     lit = light > max(DARK, 0.05 * float(np.quantile(light, 0.95)))
     if not lit.any():
@@ -410,8 +420,7 @@ def _matte_of(balanced: NDArray) -> NDArray[np.float64] | None:
     balanced, light = balanced[lit], light[lit]
     same = _main_material(balanced)
     balanced, light = balanced[same], light[same]
-    low, high = np.quantile(light, (0.5, 0.9))
-    color = np.quantile(balanced[(light >= low) & (light <= high)], 0.5, axis=0)
+    color = _median_between(balanced, light, 0.5, 0.9)
     return color - _gloss_against(color, balanced)
 
 
@@ -438,8 +447,7 @@ def _most_colored(pixels: NDArray) -> NDArray[np.float64]:
     light = pixels.mean(axis=1)
     well_lit = pixels[_main_material(pixels) & (light >= np.quantile(light, 0.35))]
     colored = 1 - well_lit.min(axis=1) / well_lit.mean(axis=1)
-    low, high = np.quantile(colored, (0.55, 0.95))
-    return np.quantile(well_lit[(colored >= low) & (colored <= high)], 0.5, axis=0)
+    return _median_between(well_lit, colored, 0.55, 0.95)
 
 
 def white_at(picture: Picture, pixel: ArrayLike, gray: float = 1.0) -> NDArray[np.float64]:

@@ -360,6 +360,23 @@ def test_tiny_pictures(shape):
     np.testing.assert_array_equal(result.reshape(-1, 3)[2:], image.reshape(-1, 3)[2:])
 
 
+@given(st.integers(0, 2**32 - 1), st.integers(1, 24), st.integers(1, 24), st.sampled_from([0.02, 0.2, 0.9]))
+@settings(max_examples=150, deadline=None)
+def test_scraps_of_pictures_are_recolored_or_refused(seed, height, width, share):
+    rng = np.random.default_rng(seed)
+    shades = rng.uniform(0, 0.6, (height, width, 1)) * rng.uniform(0, 1, 3)
+    image = [shades, rng.uniform(-0.1, 1.2, (height, width, 3)), np.where(shades < 0.1, 1.0, shades)][seed % 3]
+    picture = image.astype(np.float32) if seed % 2 else (255 * np.clip(image, 0, 1)).astype(np.uint8)
+    mask = (rng.random((height, width)) < share).astype(np.float32)
+    for reference in (None, (width // 2, height // 2)):
+        try:
+            analysis = analyze(picture, reference=reference, mask=mask)
+        except DyehouseError:
+            continue
+        assert np.isfinite(analysis.recolor(TARGET)).all()
+        assert np.isfinite(analysis.predicted(TARGET).median)
+
+
 def test_soft_mask_everywhere(product):
     # No pixel is wholly covered: hair, lace, a thin strap.
     image = np.tile(np.array([0.5, 0.2, 0.1], np.float32), (20, 30, 1))
