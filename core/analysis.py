@@ -49,6 +49,9 @@ _SAMPLE = 200_000
 # the part of what was not explained that another reference may leave.
 _FOLDS, _PALE_FOLDS, _DEEP, _MUCH_LESS = 0.015, 0.06, 0.4, 0.6
 
+# Bounce that a click may hold which is odd in its region: more of it is a material of another kind, as silk is.
+_ODD_BOUNCE = 0.3
+
 # Pixels that the predicted error is found at: for its map, and for the region; and those in one go.
 _MAPPED, _LOOKED_AT, _AT_ONCE = 1_000_000, 1_000, 10_000
 
@@ -428,7 +431,7 @@ def analyze(
         )
     found, evidence = _look(picture, found, w, m, model)
     gain = stability.noise_gain(found.color, w)
-    apart = stray(found, w, evidence.matte) if m is not None and found.pixel else 0.0
+    apart = _apart(found, w, m, evidence)
     warnings = (
         reference_warnings(found, w, model)
         + _stray_warnings(apart)
@@ -466,11 +469,12 @@ def _look(
     evidence = choose(picture, found.color, white, mask, found.pixel, model)
     if model not in ("auto", "bounce"):
         return found, evidence
-    for other in unfolded(found, white) if evidence.broken > _FOLDS else ():
-        if other.palest and evidence.broken < _PALE_FOLDS:
+    odd = _apart(found, white, mask, evidence) > 0
+    for other in unfolded(found, white) if odd or evidence.broken > _FOLDS else ():
+        if other.palest and not odd and evidence.broken < _PALE_FOLDS:
             continue
         folds = choose(picture, other.color, white, mask, found.pixel, model)
-        if _fits_better(folds, evidence, other.palest):
+        if _fits_better(other, folds, evidence, odd):
             return other, folds
     if found.gloss > 0 and evidence.mixture.model != "dichromatic":
         # Folds are more saturated than a matte ridge, which makes it look glossy beside them.
@@ -481,11 +485,18 @@ def _look(
     return found, evidence
 
 
-def _fits_better(folds: Evidence, evidence: Evidence, palest: bool) -> bool:
+def _fits_better(other: Reference, folds: Evidence, evidence: Evidence, odd: bool) -> bool:
     """Whether what a region shows about a reference that was parted from its bounce speaks for it."""
     if folds.matte:
-        return not palest or folds.figures["bounce"] > _DEEP
-    return not palest and folds.broken < _MUCH_LESS * evidence.broken
+        return not other.palest or folds.figures["bounce"] > _DEEP
+    if other.palest:
+        return False
+    return folds.broken < _MUCH_LESS * evidence.broken or (odd and other.bounce < _ODD_BOUNCE)
+
+
+def _apart(found: Reference, white: NDArray, mask: NDArray | None, evidence: Evidence) -> float:
+    """Color difference of an odd click from most of its region; 0 of an ordinary one."""
+    return stray(found, white, evidence.matte) if mask is not None and found.pixel is not None else 0.0
 
 
 def _check_finite(picture: Picture) -> None:

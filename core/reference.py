@@ -35,8 +35,8 @@ _READINGS, _SAMPLE_WHITE = 4_000, 60_000
 # and how far these reach below the middle by noise alone, in standard deviations.
 _CLOSE, _AS_CLOSE, _CLOSE_DEVIATE = 0.15, 1.75, 1.33
 
-# Sine of the angle to the white under which gloss, bounce and body look alike.
-_GRAYISH = 0.1
+# Sine of the angle to the white under which gloss and body look alike, and under which body and bounce do.
+_GRAYISH, _GRAYER = 0.1, 0.02
 
 # Sine of the angle by which a pixel of the same material may leave the plane of its color and the white.
 _OFF_PLANE = 0.035
@@ -228,7 +228,7 @@ def unfolded(found: Reference, white: NDArray) -> tuple[Reference, ...]:
     """
     readings = _held_against(found)
     matte = _matte_of(readings)
-    if matte is None or sine(matte) < _GRAYISH:
+    if matte is None or sine(matte) < _GRAYER:
         return ()
     read = replace(found, color=found.color + found.gloss * white, gloss=0.0)
     palest = _palest(matte, readings)

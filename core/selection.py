@@ -87,9 +87,6 @@ _GRAY, _LITTLE = 1e-3, 1 / 6
 # Mean square of the bounce, against the usual one, beyond which it is something else.
 _MOST_BOUNCE = 3.0
 
-# The same under which there is so little of it that a product may shine instead.
-_SLIGHT = 0.2
-
 # Noise of the split into body and gloss, relative to the light, from which it is smoothed; and up to which a second
 # light is worth the noise that it costs, if the gloss of the highlights says that the product shines at all.
 _NOISY, _LOUD, _SHINES = 0.02, 0.06, 0.3
@@ -225,8 +222,6 @@ def choose(
         figures |= {"feedback": feedback, "matte_unexplained": _matte(seen, feedback)} | _glossy(seen, usual)
         dull = figures["highlights"] < _SHINY and seen.clipped < _FEWEST_CLIPPED
         matte = dull and figures["matte_unexplained"] < max(_FEW, broken / 3)
-        # Under noise, little bounce may as well be gloss that is not everywhere.
-        matte &= not noisy or figures["bounce"] > _SLIGHT
         few = _SOME if figures["residual"] < _FEW else max(_FEW, broken / 8)
         glossy = figures["glossy_unexplained"] < few and figures["bounce"] < _MOST_BOUNCE
         # What is bounced all over metal is the color of its surroundings.
