@@ -265,8 +265,8 @@ _FAILS = (
     "slope) was tried and did no better, since pigments are not smooth.",
     "**A pale product clicked in its shade.** What a click holds of light that met the product before is found from "
     "the product's other colors and left out, as gloss is. Between gloss and bounce, in almost opposite directions on "
-    "a pale product, that goes wrong: one click in ten on a pink mug is off by 5 to 14, and few of these are flagged "
-    "(see calibration.md). Click an open, lit part.",
+    "a pale product, that goes wrong: a tenth of the clicks on a pale mug is off by 4 or more, on white cloth between "
+    "two lights by 20 to 50, and few of these are flagged (see calibration.md). Click an open, lit part.",
     "**Truly gray products.** Nothing tells gloss from body: highlights take the body color.",
     "**Satin and heather.** The sheen of satin is partly colored, and heather has two body colors. The plane of body "
     "and white holds what can be held.",
