@@ -279,6 +279,15 @@ def clicks(
             yield Click(float(share), *figures)
 
 
+def from_each(scene: str, settings: Settings, colors: Mapping[str, RGB]) -> Iterator[Pair]:
+    """From every color, the first pair that can be read."""
+    seen = set()
+    for pair in pairs(scene, settings, colors):
+        if pair.source not in seen and pair.readable:
+            seen.add(pair.source)
+            yield pair
+
+
 @dataclass(frozen=True)
 class Anywhere:
     """A click anywhere on the lit product; the target is what a true sample shows at the same place.
@@ -311,11 +320,7 @@ def anywhere(
 ) -> Iterator[Anywhere]:
     """Click pixels that get a fifth of the light of the brightest or more, from every color to the next."""
     rng = np.random.default_rng(0)
-    seen = set()
-    for pair in pairs(scene, settings, colors):
-        if pair.source in seen or not pair.readable:
-            continue
-        seen.add(pair.source)
+    for pair in from_each(scene, settings, colors):
         picture, exposure = through(pair, camera)
         light = pair.photo.mean(axis=2)
         inside, whole = pair.view.interior, (pair.photo.max(axis=2) < 1) & (pair.truth.max(axis=2) < 1)
@@ -364,11 +369,7 @@ def footings(scenes: Sequence[str], settings: Settings, colors: Mapping[str, RGB
     """From every color to the next; targets are flat, in the light of the reference that is used."""
     lights = light_colors(LINEAR_SRGB)
     for scene in scenes:
-        seen = set()
-        for pair in pairs(scene, settings, colors):
-            if pair.source in seen or not pair.readable:
-                continue
-            seen.add(pair.source)
+        for pair in from_each(scene, settings, colors):
             picture = Picture(pair.photo)
             true, _ = _flat(picture, pair, pair.view.reference, pair.white)
             found, asks = _flat(picture, pair, None, pair.white)

@@ -86,9 +86,9 @@ class Analysis:
         Sentences for the user, each with a remedy.
     gloss
         Surface reflection that was found in the reference pixel and left out of `reference`, as a share of the white.
-    bounce
-        Light that had met the product before, which was found in the reference pixel and left out too: a multiple of
-        :func:`interreflection.bounced` of what `light` times is `reference`.
+    bounce, light
+        What was found in the reference pixel besides gloss is ``light * v + bounce * bounced(v)``, see
+        `interreflection`; `reference` is the first part, for the second is light that had met the product before.
     stray
         CIEDE2000, lightness apart, between the color that was clicked and that of most of the product; 0 for an
         ordinary click.
@@ -429,9 +429,8 @@ def analyze(
             "The white and the reference are the same color: pick the product for the reference, and a white or grey "
             "card for the white."
         )
-    found, evidence = _look(picture, found, w, m, model)
+    found, evidence, apart = _look(picture, found, w, m, model)
     gain = stability.noise_gain(found.color, w)
-    apart = _apart(found, w, m, evidence)
     warnings = (
         reference_warnings(found, w, model)
         + _stray_warnings(apart)
@@ -464,25 +463,29 @@ def analyze(
 
 def _look(
     picture: Picture, found: Reference, white: NDArray, mask: NDArray | None, model: str
-) -> tuple[Reference, Evidence]:
-    """Choose the model, and the reference with it: what sets a click apart from its region may be gloss or folds."""
+) -> tuple[Reference, Evidence, float]:
+    """Choose the model, and the reference with it: what sets a click apart from its region may be gloss or folds.
+
+    Returns them, and how odd the reference is, see :func:`_apart`.
+    """
     evidence = choose(picture, found.color, white, mask, found.pixel, model)
+    apart = _apart(found, white, mask, evidence)
     if model not in ("auto", "bounce"):
-        return found, evidence
-    odd = _apart(found, white, mask, evidence) > 0
+        return found, evidence, apart
+    odd = apart > 0
     for other in unfolded(found, white) if odd or evidence.broken > _FOLDS else ():
         if other.palest and not odd and evidence.broken < _PALE_FOLDS:
             continue
         folds = choose(picture, other.color, white, mask, found.pixel, model)
         if _fits_better(other, folds, evidence, odd):
-            return other, folds
+            return other, folds, _apart(other, white, mask, folds)
     if found.gloss > 0 and evidence.mixture.model != "dichromatic":
         # Folds are more saturated than a matte ridge, which makes it look glossy beside them.
-        read = replace(found, color=found.color + found.gloss * white, gloss=0.0)
+        read = found.as_read(white)
         folds = choose(picture, read.color, white, mask, read.pixel, model)
         if folds.matte:
-            return read, folds
-    return found, evidence
+            return read, folds, _apart(read, white, mask, folds)
+    return found, evidence, apart
 
 
 def _fits_better(other: Reference, folds: Evidence, evidence: Evidence, odd: bool) -> bool:

@@ -295,7 +295,8 @@ class Doubt:
         bound = REGION_BOUND * most
         model = self.grounds.mixture.model
         rivaled = model in ("metal", "lights") or (model == "bounce" and self.grounds.other is not None)
-        overruled = rivaled and float(np.median(self._disagreement(seen))) > FLAG_MODEL
+        apart = parts["lights"] if model == "lights" or not rivaled else self._disagreement(seen)
+        overruled = rivaled and float(np.median(apart)) > FLAG_MODEL
         said = []
         if median > FLAG:
             worst = max(parts, key=lambda name: WEIGHTS[name] * float(np.median(parts[name])))

@@ -82,7 +82,7 @@ class Reference:
     palest
         Whether v is the palest color of the material, as is right if nothing shines.
     readings
-        (n, 3) colors of the product that it was held against, relative to the white; None if it was given as a color.
+        (n, 3) colors of the product that it was held against, relative to the white; none if it was given as a color.
     """
 
     color: NDArray[np.float64]
@@ -91,7 +91,11 @@ class Reference:
     bounce: float = 0.0
     light: float = 1.0
     palest: bool = False
-    readings: NDArray[np.float64] | None = field(default=None, repr=False)
+    readings: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)), repr=False)
+
+    def as_read(self, white: NDArray) -> Reference:
+        """Return the reference with the gloss that was left out of it."""
+        return replace(self, color=self.color + self.gloss * white, gloss=0.0)
 
 
 def check_pixel(picture: Picture, pixel: ArrayLike, what: str) -> tuple[int, int]:
@@ -226,12 +230,11 @@ def unfolded(found: Reference, white: NDArray) -> tuple[Reference, ...]:
     -------
     References without bounce, the palest first, of which the region has to tell whether one is right.
     """
-    readings = _held_against(found)
-    matte = _matte_of(readings)
+    matte = _matte_of(found.readings)
     if matte is None or sine(matte) < _GRAYER:
         return ()
-    read = replace(found, color=found.color + found.gloss * white, gloss=0.0)
-    palest = _palest(matte, readings)
+    read = found.as_read(white)
+    palest = _palest(matte, found.readings)
     parted = _parted(read, white, palest, True), _parted(read, white, matte, False)
     if found.pixel is None and parted[0] is not None:
         # In the light of the lamps, as there is no click to say which.
@@ -255,7 +258,7 @@ def stray(found: Reference, white: NDArray, matte: bool) -> float:
     -------
     CIEDE2000; 0 where the click is an ordinary one, or there is nothing to hold it against.
     """
-    readings = _held_against(found)[::_FEW_READINGS]
+    readings = found.readings[::_FEW_READINGS]
     main = _matte_of(readings)
     if main is None:
         return 0.0
@@ -267,10 +270,6 @@ def stray(found: Reference, white: NDArray, matte: bool) -> float:
     lab = linear_to_lab(_MIDDLE * colors / np.maximum(colors.mean(axis=1, keepdims=True), 1e-6), LINEAR_SRGB)
     away, *others = delta_e_2000(lab[1:], lab[0])
     return float(away) if away > _STRAY and np.mean(np.array(others) >= away) < _RARE else 0.0
-
-
-def _held_against(found: Reference) -> NDArray[np.float64]:
-    return np.empty((0, 3)) if found.readings is None else found.readings
 
 
 def _parted(read: Reference, white: NDArray, matte: NDArray, palest: bool) -> Reference | None:
